@@ -187,6 +187,8 @@ class FlatScene:
         guard.attempt(self._warn, self.where(body), None, motion.STANDS_STILL,
                       self.motion.follow, key, body, matrix, at_frame, self)
         body.color, body.pass_index, body[standin.RANDOM] = original.color, original.pass_index, random
+        if original.type != "LIGHT" and original.is_shadow_catcher:
+            self.add_extras(body, shadow_catcher=True)
         if "caustique" in original:
             self.add_extras(body, **original["caustique"].to_dict())
         if original == bpy.context.scene.camera and self.scene.camera is None:
@@ -272,9 +274,8 @@ class FlatScene:
             if kind not in {"NONE", "OBJECT", "COLLECTION"}:
                 what = "hair" if kind == "PATH" else f"particles that render as {kind}"
                 self._warn(where, f'{what} of particle system "{system.name}" is not carried: convert it to a mesh')
-        if thing.type != "LIGHT" and (thing.is_holdout or thing.is_shadow_catcher):
-            what = "a holdout" if thing.is_holdout else "a shadow catcher"
-            self._warn(where, f"it is {what}, which is not carried: it is seen as any other object")
+        if thing.type != "LIGHT" and thing.is_holdout:
+            self._warn(where, "it is a holdout, which is not carried: it is seen as any other object")
         linking = thing.light_linking
         for kind, collection, what in (("light", linking.receiver_collection, "it shines on every object"),
                                        ("shadow", linking.blocker_collection, "every object blocks its light")):

@@ -48,6 +48,9 @@ pub struct Shape {
     pub lobes: bool,
     /// Names of the light groups that have layers.
     pub groups: Vec<String>,
+    /// Indices of the instances that are shadow catchers. The sums of pixels for light groups then have one more entry:
+    /// the light on catchers with and without the shadows of other objects.
+    pub catchers: Vec<u32>,
 }
 
 /// The state of one pixel from which a layer's values are computed.
@@ -120,12 +123,27 @@ pub fn radius_layers(kinds: ByKind<bool>) -> Vec<(Kind, &'static str)> {
     present.zip(["Radius", "CausticRadius"]).collect()
 }
 
+/// Alpha of a pixel without a visible environment: the fraction of camera paths that hit a surface. On shadow catchers it
+/// is the share of light that other objects take away; `groups` is the index of the sums of that light.
+fn covered(pixel: &PixelAccumulator, catchers: &[u32], groups: usize) -> f32 {
+    let hit = pixel.coverage.hit_fraction();
+    if catchers.is_empty() {
+        return hit;
+    }
+    let on = pixel.coverage.fractions().filter(|(instance, _)| catchers.contains(instance));
+    let caught: f32 = on.map(|(_, fraction)| fraction).sum();
+    let [lit, unshadowed] = pixel.group(groups).map(|light| light.element_sum());
+    let left = if unshadowed > 0.0 { (lit / unshadowed).clamp(0.0, 1.0) } else { 1.0 };
+    (hit - caught * left as f32).max(0.0)
+}
+
 /// All layers of a render of this shape, except the cryptomattes.
 fn columns(shape: &Shape) -> Vec<Column> {
     let Shape { levels, compared, own, kinds, environment, volume_photons, .. } = *shape;
+    let (catchers, groups) = (shape.catchers.clone(), shape.groups.len());
     let mut columns = vec![
         Column::new("", move |at| {
-            let alpha = if environment { 1.0 } else { at.pixel.coverage.hit_fraction() };
+            let alpha = if environment { 1.0 } else { covered(at.pixel, &catchers, groups) };
             at.pixel.mean(own).as_vec3().extend(alpha).to_array()
         }),
         Column::rgb("Noisy", move |p| p.mean(own)),
@@ -279,6 +297,7 @@ mod tests {
             volume_photons: true,
             lobes: true,
             groups: vec!["key".into()],
+            catchers: Vec::new(),
         }
     }
 

@@ -101,6 +101,8 @@ pub struct Instance {
     pub object: u32,
     /// Whether camera rays pass through the instance. All other rays hit it.
     pub hidden_from_camera: bool,
+    /// Whether the picture shows only the shadows of other objects on the instance, as alpha, and their light.
+    pub shadow_catcher: bool,
     /// Whether the place or the shape of the instance depends on the time while the shutter is open.
     pub moves: bool,
     /// Transform from local to world space; `None` if the mesh is in world space.

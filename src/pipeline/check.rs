@@ -2,14 +2,14 @@
 
 use super::layers;
 use super::memory::MemoryCheck;
-use super::request::{PictureRequest, Request};
+use super::request::{MethodRequest, PictureRequest, Request};
 use crate::camera::Camera;
 use crate::error::{Error, ErrorKind, Result};
 use crate::estimator::InitialBandwidth;
 use crate::estimator::bandwidth::MIN_USER_RADIUS_RATIO;
 use crate::plan::Search;
-use crate::render::Settings;
 use crate::render::output::layer_shape;
+use crate::render::{Candidate, Settings};
 use crate::scene::{Scene, View};
 use crate::transport::Indirect;
 use std::path::Path;
@@ -28,7 +28,13 @@ pub struct Checked {
 /// The scene has no such camera, or the method cannot render the scene.
 pub fn check_picture(picture: &PictureRequest<'_>, path: &Path, scene: &Scene) -> Result<Checked> {
     let camera = scene.camera(&picture.camera)?;
-    let settings = picture.method.settings();
+    let settings = match &picture.method {
+        MethodRequest::Auto(auto) if scene.survey.catchers => {
+            (auto.settings_of)(Candidate::CAMERA_PATHS, camera.whole()[0])
+        }
+        _ => None,
+    };
+    let settings = settings.as_ref().unwrap_or(picture.method.settings());
     check_settings(settings, path, scene)?;
     let settings = with_light_paths(settings.clone(), picture.photons, camera.whole()[0]);
     Ok(Checked { camera, settings })
@@ -60,8 +66,18 @@ pub fn with_light_paths(settings: Settings, photons: Option<u32>, size: (u32, u3
 /// # Errors
 /// The method does not render scattering media, or the initial bandwidth does not suit the scene.
 pub fn check_settings(settings: &Settings, path: &Path, scene: &Scene) -> Result<()> {
+    if !renders_catchers(settings, scene) {
+        let cause = format!("--method {} does not render shadow catchers", settings.method.name());
+        return Err(Error::new(ErrorKind::Usage, path.display(), cause).hint("choose --method path"));
+    }
     check_media(settings, path, scene)?;
     check_bandwidth(settings, path, scene)
+}
+
+/// Whether the scene has no shadow catchers, or the method renders them: other methods do not tell the light of a catcher
+/// from that of other objects.
+pub(super) fn renders_catchers(settings: &Settings, scene: &Scene) -> bool {
+    !scene.survey.catchers || settings.method.search() == Search::CameraPaths
 }
 
 /// Rejects settings whose method stores photons on surfaces only, if the scene has scattering media.

@@ -1,5 +1,6 @@
 //! The third step: the method. `auto` compares candidates.
 
+use super::check::renders_catchers;
 use super::layers;
 use super::observer::{Event, Observer, Phase, during};
 use super::request::{MethodRequest, Request};
@@ -44,7 +45,10 @@ pub fn choose(
     stop: impl Fn() -> bool,
 ) -> Chosen {
     let MethodRequest::Auto(auto) = method else { return Chosen::named(checked) };
-    let settings_of = |candidate| (auto.settings_of)(candidate, view.camera.whole()[0]).filter(&accepts);
+    let settings_of = |candidate| {
+        (auto.settings_of)(candidate, view.camera.whole()[0])
+            .filter(|settings| accepts(settings) && renders_catchers(settings, view.scene))
+    };
     match choose::choose(view, settings_of, stop) {
         Some(choice) => {
             Chosen { settings: choice.settings.clone(), candidate: Some(choice.candidate), choice: Some(choice) }

@@ -41,6 +41,9 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     dense::limit_densities(&shapes, &mut materials, &mut description.medium, &mut warnings);
     let materials = Arc::new(materials);
     let (tracer, pass_through_lights) = tracers(&shapes, &materials, threads)?;
+    let catchers = catchers(&shapes, &materials, threads)?;
+    // The picture is laid over a photograph.
+    description.picture.film_transparent |= catchers.is_some();
 
     let sky = Sky {
         center: (center - origin).as_vec3(),
@@ -77,6 +80,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         preset_floor: description.preset_floor,
         tracer,
         pass_through_lights,
+        catchers,
         lights,
         light_names,
         guessed_units: description.guessed_units,
@@ -254,6 +258,7 @@ pub(super) fn rebuild_with_materials(
         true => (scene.tracer.clone(), scene.pass_through_lights.clone()),
         false => tracers(&shapes, &materials, rayon::current_num_threads())?,
     };
+    let catchers = catchers(&shapes, &materials, rayon::current_num_threads())?;
     let others = scene.lights.others().cloned();
     let sky = Sky { environment, ..scene.lights.sky().clone() };
     let lights = Lights::new(&shapes, &materials, others.collect(), sky).with_groups(scene.lights.groups().clone());
@@ -266,6 +271,7 @@ pub(super) fn rebuild_with_materials(
         preset_floor: scene.preset_floor,
         tracer,
         pass_through_lights,
+        catchers,
         light_names: scene.light_names.clone(),
         guessed_units: scene.guessed_units.clone(),
         environment_unknown: scene.environment_unknown,
@@ -327,6 +333,7 @@ fn place_instances(description: &mut Description, origin: DVec3) -> Shapes {
             material: placed.material,
             object: placed.object,
             hidden_from_camera: placed.hidden_from_camera,
+            shadow_catcher: placed.shadow_catcher,
             moves: placed.moves,
             to_world: shared.then(|| placement(&to_world)),
         });
@@ -379,6 +386,17 @@ pub(super) fn tracers(
     let passed = |instance: &Instance| materials.list[instance.material as usize].null_bsdf;
     let has_pass_through = shapes.instances.iter().any(passed);
     Ok((build(false)?, has_pass_through.then(|| build(true)).transpose()?))
+}
+
+/// An Embree scene of the shadow catchers; `None` if there are none.
+pub(super) fn catchers(shapes: &Arc<Shapes>, materials: &Arc<Materials>, threads: usize) -> Result<Option<Tracer>> {
+    if !shapes.instances.iter().any(|instance| instance.shadow_catcher) {
+        return Ok(None);
+    }
+    let all = filtered(shapes, materials, false);
+    let chosen: Vec<Option<bool>> =
+        shapes.instances.iter().zip(all).map(|(instance, of)| of.filter(|_| instance.shadow_catcher)).collect();
+    Tracer::build(shapes, &chosen, &hit_filter(shapes, materials), threads).map(Some)
 }
 
 /// For each instance, whether its hits are filtered; `None` for instances that are not lights that all rays pass through,
@@ -567,6 +585,7 @@ pub(super) fn add_light_spheres(description: &mut Description) {
             material: description.materials.len() as u32,
             object: description.objects.len() as u32,
             hidden_from_camera: light.hidden_from_camera,
+            shadow_catcher: false,
             light_group: light.light_group.clone(),
             moves: description.blur().is_some(),
             to_world: DAffine3::from_translation(light.to_world.translation),

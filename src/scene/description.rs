@@ -119,6 +119,8 @@ pub struct PlacedMesh {
     pub object: u32,
     /// Whether camera rays pass through the instance; other rays hit it.
     pub hidden_from_camera: bool,
+    /// Whether the picture shows only the shadows of other objects on the instance, as alpha, and their light.
+    pub shadow_catcher: bool,
     /// Name of the light group (a named set of lights with a layer of its own) of the instance, if it is emissive.
     pub light_group: Option<String>,
     /// Whether the place or the shape of the instance depends on the time while the shutter is open.

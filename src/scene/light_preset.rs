@@ -119,6 +119,7 @@ fn add_floor(description: &mut Description) {
             material: description.materials.len() as u32,
             object,
             hidden_from_camera: false,
+            shadow_catcher: false,
             light_group: None,
             moves: false,
             to_world: DAffine3::from_translation(middle),

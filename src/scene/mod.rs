@@ -62,6 +62,9 @@ pub struct Scene {
     pub tracer: Tracer,
     /// Embree scene of the lights that rays pass through ([`crate::material::Material::null_bsdf`]), if there are any.
     pub pass_through_lights: Option<Tracer>,
+    /// Embree scene of the shadow catchers, which alone block the light of [`crate::transport`]'s unshadowed rays; `None`
+    /// if there are none.
+    pub catchers: Option<Tracer>,
     /// All lights, with the distributions that sample them.
     pub lights: Lights,
     /// Names of the lights that are not triangles: points, spots and suns, in the order of [`Lights::emitters`].

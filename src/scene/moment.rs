@@ -77,6 +77,7 @@ impl<'a> MomentBuilder<'a> {
             && !self.moves_emitters(&shapes, &materials);
         let lights = scene.lights.at_moment((&shapes, &materials), others, sky, !same_lights);
         let (tracer, pass_through_lights) = self.tracers(&shapes, &materials)?;
+        let catchers = build::catchers(&shapes, &materials, rayon::current_num_threads())?;
         Ok(Scene {
             source: scene.source.clone(),
             converted: scene.converted.clone(),
@@ -86,6 +87,7 @@ impl<'a> MomentBuilder<'a> {
             preset_floor: scene.preset_floor,
             tracer,
             pass_through_lights,
+            catchers,
             light_names: scene.light_names.clone(),
             guessed_units: scene.guessed_units.clone(),
             environment_unknown: scene.environment_unknown,

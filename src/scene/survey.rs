@@ -38,6 +38,8 @@ pub struct Survey {
     pub delta_lights: bool,
     /// Whether some light is at infinity.
     pub infinite_lights: bool,
+    /// Whether some instance is a shadow catcher.
+    pub catchers: bool,
     /// Whether the scene has an environment that cameras see.
     pub environment: bool,
 }
@@ -63,6 +65,7 @@ impl Survey {
         for instance in &shapes.instances {
             uses[instance.material as usize] += 1;
             survey.hidden_from_camera |= instance.hidden_from_camera;
+            survey.catchers |= instance.shadow_catcher;
         }
         let (mut solids, mut perfect, mut sharp) = (0, false, false);
         for (material, &uses) in materials.list.iter().zip(&uses) {

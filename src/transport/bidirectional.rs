@@ -282,6 +282,13 @@ pub trait PathRecorder {
     fn first_surface(&mut self, colors: [Rgb; 3]) {
         let _ = colors;
     }
+
+    /// The camera path hits a shadow catcher first, which reflects this light to the camera, with and without the shadows
+    /// of other objects.
+    #[inline]
+    fn caught(&mut self, light: [Rgb; 2]) {
+        let _ = light;
+    }
 }
 
 impl PathRecorder for () {}

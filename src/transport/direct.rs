@@ -15,6 +15,7 @@ use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3, is_lit};
 use crate::random::Purpose;
 use crate::scene::Scene;
+use crate::trace::{Ray, Tracer};
 
 /// Probability of tracing a BSDF sample of the gathering lobes. They are broad, so the light sample is nearly always
 /// the better one; the BSDF sample bounds the error near large lights. One in sixteen instead of one in eight changes
@@ -120,6 +121,32 @@ pub(super) fn next_event(
         }
     }
     arriving * left
+}
+
+/// Direct light at a vertex on a shadow catcher, with the shadows of all objects and with those of catchers alone, both
+/// by the same sample of a light.
+pub(super) fn caught_light(scene: &Scene, vertex: &impl ScatterPoint, catchers: &Tracer) -> [Rgb; 2] {
+    let draws = vertex.draws();
+    let (choice, point) = (draws.one_fine(Purpose::LightChoice), draws.two(Purpose::LightPoint));
+    let Some(light) = scene.lights.sample_direct(&scene.shapes, &scene.materials, &vertex.receiver(), choice, point)
+    else {
+        return [Rgb::ZERO; 2];
+    };
+    let (f, _) = vertex.evaluate_cos(light.wi, Transport::Radiance, LobeSet::ALL);
+    let arriving = vertex.throughput() * f * light.radiance / light.pdf_w;
+    if !(is_lit(arriving) && arriving.is_finite()) {
+        return [Rgb::ZERO; 2];
+    }
+    let token = token(scene, draws, Purpose::ShadowAlpha);
+    let origin = vertex.ray_origin(light.wi);
+    let (direction, tmax) = match light.target {
+        None => (light.wi, f32::INFINITY),
+        Some(target) => ((target - origin) / (target - origin).length(), (target - origin).length()),
+    };
+    if catchers.occluded(&Ray { origin, direction, tmax, token }) {
+        return [Rgb::ZERO; 2];
+    }
+    [arriving * vertex.shadow_ray_to_light(scene, &light, token).transmittance, arriving]
 }
 
 #[inline]

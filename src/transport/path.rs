@@ -7,6 +7,7 @@ use super::bidirectional::{PathKind, PathRecorder, Technique};
 use super::bidirectional_camera::{record_medium, record_surface};
 use super::camera_paths::CameraPaths;
 use super::cause::Cause;
+use super::direct::caught_light;
 use super::lobe_layers::{FirstScatter, LobeHistory};
 use super::pass_through::{BulbHit, PassThroughHit};
 use super::path_history::PathHistory;
@@ -24,6 +25,7 @@ use crate::medium::FlightDensity;
 use crate::plan::{ClassSet, LightPrefix, Part};
 use crate::random::{Purpose, Stream};
 use crate::scene::Scene;
+use crate::trace::Tracer;
 use bumpalo::Bump;
 
 struct PathTracer<'a, R> {
@@ -37,6 +39,9 @@ struct PathTracer<'a, R> {
     last: Receiver,
     /// Number of path segments up to the last vertex.
     depth: u32,
+    /// Whether the last vertex is the first one, on a shadow catcher. Lights that the path then finds, and other catchers,
+    /// are in the photograph below the picture.
+    on_catcher: bool,
     record: &'a mut R,
 }
 
@@ -114,6 +119,21 @@ impl<R: PathRecorder> PathTracer<'_, R> {
         } += light;
     }
 
+    /// Whether a vertex shows no light of its own because of shadow catchers: the path arrives at a catcher first, whose
+    /// light is recorded apart, or at a light or another catcher from there, where it ends.
+    #[cold]
+    #[inline(never)]
+    fn catches(&mut self, vertex: &Vertex<'_, '_>, scattered: Option<Scattered>, catchers: &Tracer) -> bool {
+        let instance = &self.scene.shapes.instances[vertex.surface.instance as usize];
+        let came_from_catcher = std::mem::take(&mut self.on_catcher);
+        if scattered.is_none() && instance.shadow_catcher {
+            self.record.caught(caught_light(self.scene, vertex, catchers));
+            self.on_catcher = true;
+        }
+        let emits = || self.scene.materials.list[vertex.surface.material as usize].emits();
+        self.on_catcher || (came_from_catcher && (instance.shadow_catcher || emits()))
+    }
+
     /// Decides how the path continues after a vertex.
     fn next(&self) -> Next {
         if self.history.leads(self.classes) { Next::Continue(LobeSet::ALL) } else { Next::Stop }
@@ -132,6 +152,13 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
             self.record.first_surface(vertex.shading.lobe_albedos());
         }
         self.depth = vertex.depth;
+        if let Some(catchers) = &self.scene.catchers
+            && self.catches(vertex, scattered, catchers)
+        {
+            self.last = vertex.receiver();
+            self.history.leave(Some(vertex.shading.bsdf.lobes()));
+            return if self.on_catcher { self.next() } else { Next::Stop };
+        }
         let from = if scattered.is_none() { Receiver::anywhere(vertex.from) } else { self.last };
         if let Some((radiance, pdf)) =
             self.scene.lights.hit_radiance(&self.scene.materials, &from, vertex.surface, vertex.wo)
@@ -166,6 +193,9 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
     }
 
     fn pass_through_light(&mut self, hit: &PassThroughHit, scattered: Option<Scattered>) {
+        if self.on_catcher {
+            return;
+        }
         let mut history = self.history;
         if let Some(scattered) = scattered {
             history.scattered(scattered.lobe);
@@ -200,7 +230,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
         if let Some(scattered) = scattered {
             history.scattered(scattered.lobe);
         }
-        if history.delta {
+        if history.delta && !self.on_catcher {
             let (class, first) = (history.suffix.class_at_light(false), self.first(|| FirstScatter::Emit));
             let of = PathKind { class, group: hit.group, first };
             self.add(Technique::Hit { camera: hit.depth }, of, hit.light, 1.0);
@@ -209,6 +239,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
 
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
         record_medium(&mut self.history, vertex, scattered, self.sample);
+        self.on_catcher = false;
         self.depth = vertex.depth;
         self.last = vertex.receiver();
         self.lit(vertex);
@@ -217,6 +248,9 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
     }
 
     fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, _: FlightDensity) {
+        if self.on_catcher {
+            return;
+        }
         if let Some(scattered) = scattered {
             self.history.scattered(scattered.lobe);
         }
@@ -244,7 +278,8 @@ pub fn path_sample(
     let CameraPaths { scene, max_depth, classes, .. } = *camera_paths;
     let lobes = camera_paths.lobes.then(LobeHistory::default);
     let last = Receiver::anywhere(start.origin);
-    let mut tracer = PathTracer { scene, max_depth, classes, lobes, sample, history, last, depth: 0, record };
+    let (depth, on_catcher) = (0, false);
+    let mut tracer = PathTracer { scene, max_depth, classes, lobes, sample, history, last, depth, on_catcher, record };
     walk(camera_paths.scene, arena, start, *stream, Transport::Radiance, camera_paths.max_depth, &mut tracer);
 }
 

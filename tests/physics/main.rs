@@ -9,6 +9,7 @@ mod analytic;
 mod bidirectional;
 mod bsdf;
 mod cameras;
+mod catchers;
 mod classes;
 mod contact;
 mod dispersion;

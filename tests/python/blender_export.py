@@ -268,6 +268,20 @@ class Export(unittest.TestCase):
         self.assertEqual(said["p"], {"radius": 0.25, "null_bsdf": True, "visible": {"camera": False}})
         self.assertAlmostEqual(said["s"]["angle_deg"], 3, 5)
 
+    def test_shadow_catchers_and_bulbs_are_keys_of_nodes(self):
+        for name in ("floor", "body"):
+            body = cube(node_material(name))
+            body.name, body.is_shadow_catcher = name, name == "floor"
+        data = bpy.data.lights.new("spot", "SPOT")
+        place("spot", data)
+        data.shadow_soft_size = 0.25
+        document, warnings = self.write()
+        said = {node["name"]: node.get("extras", {}).get("caustique", {}) for node in document["nodes"]}
+        self.assertIs(said["floor"]["shadow_catcher"], True)
+        self.assertNotIn("shadow_catcher", said["body"])
+        self.assertEqual((said["spot"]["radius"], said["spot"]["bulb"]), (0.25, True))
+        self.assertFalse([line for line in warnings if "catcher" in line or "bulb" in line])
+
     def test_lamp_nodes_multiply(self):
         data = bpy.data.lights.new("p", "POINT")
         data.energy, data.color = 4 * math.pi, (1, 0.5, 0.5)

@@ -45,6 +45,7 @@ pub fn add_at(description: &mut Description, name: &str, mesh: Mesh, material: M
         material: description.materials.len() as u32,
         object: description.objects.len() as u32,
         hidden_from_camera: false,
+        shadow_catcher: false,
         light_group: None,
         moves: false,
         to_world,

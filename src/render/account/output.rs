@@ -12,7 +12,12 @@ use serde_json::{Map, Value, json};
 
 /// Layers that a render of a scene has with these settings.
 pub fn layer_shape(settings: &Settings, scene: &Scene) -> output::Shape {
-    layer_shape_of(settings, &scene.survey, &scene.lights.groups().names)
+    let shape = layer_shape_of(settings, &scene.survey, &scene.lights.groups().names);
+    if !scene.survey.catchers {
+        return shape;
+    }
+    let instances = scene.shapes.instances.iter().zip(0..);
+    output::Shape { catchers: instances.filter(|(of, _)| of.shadow_catcher).map(|(_, index)| index).collect(), ..shape }
 }
 
 /// Layers of a render with these settings, for a scene with the features in `survey` and light groups of these names.
@@ -27,6 +32,7 @@ pub fn layer_shape_of(settings: &Settings, survey: &Survey, groups: &[String]) -
         volume: survey.scattering,
         volume_photons: survey.scattering && settings.method.gathers(),
         lobes: settings.lobes,
+        catchers: Vec::new(),
         groups: if settings.method.has_techniques() { groups.to_vec() } else { Vec::new() },
     }
 }

@@ -39,6 +39,15 @@ impl TileGroups {
         }
     }
 
+    /// Adds the light on a shadow catcher, with and without the shadows of other objects, to the pixel at index `slot` of
+    /// the tile. The scene has a catcher.
+    #[inline]
+    pub fn add_caught(&mut self, slot: usize, light: [Rgb; 2]) {
+        if let Some(sums) = self.light.get_mut((slot + 1) * self.groups - 1) {
+            sums.iter_mut().zip(light).for_each(|(sum, light)| *sum += light);
+        }
+    }
+
     /// Sets the albedos of the lobes at the first hit of the pixel at index `slot` of the tile.
     #[inline]
     pub fn set_colors(&mut self, slot: usize, colors: [Rgb; 3]) {

@@ -164,6 +164,13 @@ impl PathRecorder for TileRecords {
     }
 
     #[inline]
+    fn caught(&mut self, light: [Rgb; 2]) {
+        if let Some(groups) = self.groups.as_mut().filter(|_| self.level.is_some()) {
+            groups.add_caught(self.slot, light);
+        }
+    }
+
+    #[inline]
     fn first_surface(&mut self, colors: [Rgb; 3]) {
         if let Some(groups) = self.groups.as_mut().filter(|_| self.level.is_some()) {
             groups.set_colors(self.slot, colors);

@@ -239,10 +239,11 @@ impl Settings {
         vec![self.pixel_factory(scene)([0.0; 2]); width as usize * height as usize]
     }
 
-    /// Number of light groups with layers of their own. Photons do not store the group of their light, so methods that
-    /// gather them have none.
+    /// Number of light groups with layers of their own, and one more for the light on shadow catchers if there are any.
+    /// Photons do not store the group of their light, so methods that gather them have none.
     pub(in crate::render) fn light_groups(&self, scene: &Scene) -> usize {
-        if self.method.has_techniques() { scene.lights.groups().names.len() } else { 0 }
+        let groups = scene.lights.groups().names.len() + usize::from(scene.survey.catchers);
+        if self.method.has_techniques() { groups } else { 0 }
     }
 
     /// Number (from 1) of the last iteration after this shard has done `done` iterations.

@@ -171,6 +171,7 @@ pub(super) struct MaterialExtras {
 pub(super) struct ObjectExtras {
     pub(super) visible: Visible,
     pub(super) light_group: Option<String>,
+    pub(super) shadow_catcher: bool,
 }
 
 /// Content of `extras.caustique` of a camera, or of its node.
@@ -320,6 +321,7 @@ pub(super) const NODE: &[&str] = &[
     "visible",
     "visible.camera",
     "light_group",
+    "shadow_catcher",
     "ies",
     "ies.file",
     "ies.bufferView",

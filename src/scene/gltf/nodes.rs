@@ -503,9 +503,18 @@ impl<'r> Reader<'r> {
                 };
                 let (name, light_group) = (name.clone(), extras.light_group.clone());
                 let hidden_from_camera = !extras.visible.camera;
-                let placed =
-                    PlacedMesh { name, mesh, material, object, hidden_from_camera, light_group, moves, to_world };
-                self.out.instances.push(placed);
+                let shadow_catcher = extras.shadow_catcher;
+                self.out.instances.push(PlacedMesh {
+                    name,
+                    mesh,
+                    material,
+                    object,
+                    hidden_from_camera,
+                    shadow_catcher,
+                    light_group,
+                    moves,
+                    to_world,
+                });
             }
         }
         if flat > 0 {
