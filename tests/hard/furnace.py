@@ -169,7 +169,7 @@ CASES = [
         "furnace-wax",
         "A body that scatters all light below its surface in a white furnace",
         {"scene": partial(white, WAX)},
-        Value(1.0, WHITE, bound=0.005, resolves=0.1),
+        Value(1.0, WHITE, bound=0.005, resolves=0.2),
         ("path", "bdpt", "vcm"),
         iterations=32,
     ),
@@ -184,8 +184,7 @@ CASES = [
             resolves=0.05,
         ),
         ("path", "bdpt", "vcm"),
-        iterations=8,
-        seeds=FEW,
+        iterations=512,
     ),
     Case(
         "furnace-glass-box",
