@@ -50,6 +50,7 @@ import shading
 import sky
 import standin
 import surfaces
+import volumes
 import world
 
 # Angle between the shading normal and the face, and the share of a mesh's area, above which the picture differs visibly
@@ -106,6 +107,7 @@ def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None):
     _correct_lamps(document, flat.lamp_factors, warn)
     buffer = lamp_profiles.embed(document, buffer, flat.profiles)
     buffer = lamp_pictures.embed(document, buffer, flat.pictures)
+    volumes.embed(document, flat.volumes, path, warn)
     _put_active_camera_first(document, scene)
     buffer = motion_gltf.write(document, buffer, flat.motion, bodies_of_nodes, warn)
     said.update(motion_gltf.scene_keys(flat.motion))

@@ -53,10 +53,20 @@ def _colour(socket):
         return None
     if not hasattr(bpy.types.Light, "temperature"):  # before Blender 4.5
         return None
+    colours = blackbodies([temperature])
+    return colours and colours[0]
+
+
+def blackbodies(temperatures):
+    """The colours of blackbodies, of luminance 1; None before Blender 4.5."""
+    if "temperature" not in bpy.types.Light.bl_rna.properties:
+        return None
     bulb = bpy.data.lights.new("blackbody", "POINT")
     try:
-        bulb.use_temperature, bulb.temperature = True, temperature
-        return [max(c, 0.0) for c in bulb.temperature_color]
+        bulb.use_temperature, colours = True, []
+        for bulb.temperature in temperatures:
+            colours.append([max(c, 0.0) for c in bulb.temperature_color])
+        return colours
     finally:
         bpy.data.lights.remove(bulb)
 

@@ -18,8 +18,9 @@ import export_guard as guard
 import motion
 import standin
 import visibility
+import volumes
 from graph import upstream
-from shading import nodes_of, output_of
+from shading import VOLUME, nodes_of, output_of
 
 _SOLID = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 # Types of objects that are never visible in renders.
@@ -32,7 +33,7 @@ _MAX_EVEN_RATIO = 1.001
 STRETCHED = ("its scale is uneven, with which Cycles stretches normal maps: here they keep their slopes; apply the scale "
              "(Object > Apply > Scale) to see the same in both, or leave out --no-bake")
 _PATHS = "convert them to meshes (in the object's menu, or a Curve to Mesh node)"
-_LOST = {"CURVES": "hair curves are not carried: " + _PATHS, "VOLUME": "volumes that vary in space are not carried",
+_LOST = {"CURVES": "hair curves are not carried: " + _PATHS,
          "POINTCLOUD": "point clouds are not carried: convert them to meshes",
          "GREASEPENCIL": "grease pencil is not carried: " + _PATHS,
          "GPENCIL": "grease pencil is not carried: " + _PATHS}
@@ -44,7 +45,7 @@ class FlatScene:
     `things`: its objects. `names`: names of the original objects and meshes. `hidden`: for each of `things`, the kinds
     of rays that do not hit it. `groups`: the light group of each, or None. `lamp_factors`: for each measured lamp, the
     factors per channel of its nodes. `profiles`: the texts of IES profiles (bytes) that lamps name. `pictures`: PNGs
-    that spots throw. `stretched`: names of materials with normal maps that uneven scale stretches, found if the materials
+    that spots throw. `volumes`: grids, material and name of volumes that become boxes. `stretched`: names of materials with normal maps that uneven scale stretches, found if the materials
     may be baked (`bakes`). `motion`: how the objects move while the shutter is open.
     """
 
@@ -53,7 +54,7 @@ class FlatScene:
         layer = bpy.context.view_layer
         layer.update()
         self.things, self.names, self.hidden, self.groups, self.lamp_factors = [], {}, {}, {}, {}
-        self.profiles, self.pictures = [], []
+        self.profiles, self.pictures, self.volumes = [], [], []
         self.stretched, self._bakes = set(), bakes
         self._warn, self._meshes, self._shapes, self._made, self._applied = warn, {}, [], [], {}
         self._indirect, self._layer = visibility.indirect_only(layer), layer
@@ -75,7 +76,7 @@ class FlatScene:
         for instance in depsgraph.object_instances:
             concerned.add(instance.object.original)
             kind = instance.object.type
-            if kind == "MESH" or kind in _LOST or instance.object.original not in meshed:
+            if kind in {"MESH", "VOLUME"} or kind in _LOST or instance.object.original not in meshed:
                 found.append(guard.attempt(warn, f'object "{instance.object.name}"', None, _OUT,
                                            self._take, instance, depsgraph))
         if scene.camera is not None and not any(taken and taken[0] == scene.camera for taken in found):
@@ -124,6 +125,13 @@ class FlatScene:
             return None
         data = thing.original.data
         random = instance.random_id & 0xFFFFFFFF if instance.is_instance else _random_of_name(thing.name)
+        if thing.type == "VOLUME":
+            return self._volume(instance, random)
+        if any(m.type == "FLUID" and m.fluid_type == "DOMAIN" and m.domain_settings.domain_type == "GAS"
+               for m in thing.modifiers):
+            self._warn(f'object "{thing.name}"', f"its smoke is not carried: {_OUT}; save its cache as OpenVDB, and import "
+                       "that as a volume object")
+            return None
         if thing.type in _SOLID:
             data = self._mesh(instance, depsgraph)
         elif thing.type not in {"LIGHT", "CAMERA"}:
@@ -139,6 +147,23 @@ class FlatScene:
             hidden.append("camera")
         group = visibility.light_group(thing, parent, self._layer)
         return data and (thing.original, data, matrix, hidden, group, random / 0xFFFFFFFF, key)
+
+    def _volume(self, instance, random):
+        """`_take` of a volume: a box with a medium."""
+        thing = instance.object
+        made = volumes.box(thing, self._warn)
+        if made is None:
+            return None
+        mesh, volume, material = made
+        own = material.copy()  # volumes.embed removes it
+        own[VOLUME] = len(self.volumes)
+        self.volumes.append((volume, material, own))
+        self.names[self.remove_later(mesh).name] = thing.original.data.name
+        mesh.materials.append(own)
+        parent, key = instance.parent if instance.is_instance else None, motion.identity(instance)
+        hidden, group = visibility.hidden_rays(thing, parent), visibility.light_group(thing, parent, self._layer)
+        matrix = instance.matrix_world @ volume.matrix
+        return thing.original, mesh, matrix, hidden, group, random / 0xFFFFFFFF, key
 
     def _mesh(self, instance, depsgraph):
         """The evaluated mesh of an instance, shared with equal instances; None without faces."""

@@ -3,6 +3,8 @@ scattering of volume shaders, dispersion."""
 
 import math
 
+# Custom property of a material whose medium varies in space: the index of its volume.
+VOLUME = "caustique_volume"
 
 def nodes_of(block):
     """The node tree of a material, light or world, or None. In Blender 5 the switch is always on, but for lights of 5.0."""
@@ -110,7 +112,8 @@ def finish(entry, material, closed, thickness, warn):
     where = f'material "{material.name}"'
     output = output_of(nodes_of(material))
     extensions = entry.setdefault("extensions", {})
-    inside = medium(source(output.inputs["Volume"]), where, warn) if output is not None else None
+    varies = VOLUME in material
+    inside = medium(source(output.inputs["Volume"]), where, warn) if output is not None and not varies else None
     clear = extensions.get("KHR_materials_transmission")
     if extensions.get("KHR_materials_volume") == {"thicknessFactor": 0}:  # a film, closed mesh or not
         if inside is not None:

@@ -18,7 +18,7 @@ const SAMPLES: u32 = 4;
 const KEY: u64 = 0x66_69_72_65;
 
 /// Shows the visitor the light of the media on a segment.
-pub(super) struct Glow<'a, V> {
+pub(super) struct MediumEmission<'a, V> {
     pub scene: &'a Scene,
     pub visitor: &'a mut V,
     /// Throughput of the path at the start of the segment.
@@ -29,7 +29,7 @@ pub(super) struct Glow<'a, V> {
     pub scattered: Option<Scattered>,
 }
 
-impl<'a, V: Visitor<'a>> Glow<'_, V> {
+impl<'a, V: Visitor<'a>> MediumEmission<'_, V> {
     /// Follows the segment from `start` to the surface at its end. `known` is its first hit, if it has been traced.
     #[cold]
     #[inline(never)]
@@ -38,7 +38,7 @@ impl<'a, V: Visitor<'a>> Glow<'_, V> {
     }
 }
 
-impl<'a, V: Visitor<'a>> Through for Glow<'_, V> {
+impl<'a, V: Visitor<'a>> Through for MediumEmission<'_, V> {
     fn pass(&mut self, span: &Span) -> Passage {
         let (scene, medium) = (self.scene, &span.medium);
         let Some((instance, grids, placement)) = span.interior.grids(scene) else {

@@ -1,7 +1,7 @@
 //! The only bounce loop. It handles intersection, nested solids, roulette and depth, and does not access the film. Each
 //! algorithm is a [`Visitor`].
 
-use super::fire::Glow;
+use super::fire::MediumEmission;
 use super::flight::{Fly, Split};
 use super::interior::Interior;
 use super::pass_through::{BulbHit, PassThroughHit, for_each_bulb, for_each_pass_through_light};
@@ -224,7 +224,7 @@ impl<'a> Path<'a> {
             && scene.survey.fire
             && visitor.sees_medium_light(scattered)
         {
-            Glow { scene, visitor, throughput, draws, depth, scattered }.show(start, met);
+            MediumEmission { scene, visitor, throughput, draws, depth, scattered }.show(start, met);
         }
         if self.transport == Transport::Radiance && scene.pass_through_lights.is_some() {
             let segment =
