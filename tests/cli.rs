@@ -37,6 +37,8 @@ mod plan;
 mod rejected;
 #[path = "cli/running.rs"]
 mod running;
+#[path = "cli/serve.rs"]
+mod serve;
 #[path = "cli/temporal.rs"]
 mod temporal;
 #[path = "cli/usage.rs"]

@@ -24,11 +24,12 @@ struct Line<'a, Fields: Serialize> {
     version: u32,
 }
 
-/// Makes all messages events if the last `--progress` of a command line asks for JSON. Errors of the command line are
-/// events, too.
+/// Makes all messages events if the last `--progress` of a command line asks for JSON, or if another program sends the
+/// commands. Errors of the command line are events, too.
 pub fn use_if_asked(arguments: impl Iterator<Item = OsString>) {
     let mut form = None;
     let mut arguments = arguments.map(|word| word.to_string_lossy().into_owned());
+    let serves = arguments.by_ref().nth(1).is_some_and(|command| command == "serve");
     while let Some(word) = arguments.next() {
         match word.strip_prefix("--progress") {
             Some("") => form = arguments.next(),
@@ -36,7 +37,7 @@ pub fn use_if_asked(arguments: impl Iterator<Item = OsString>) {
             None => {}
         }
     }
-    IN_USE.store(form.as_deref() == Some("json"), Ordering::Relaxed);
+    IN_USE.store(serves || form.as_deref() == Some("json"), Ordering::Relaxed);
 }
 
 /// Whether messages are events.

@@ -17,6 +17,7 @@ mod plot;
 mod progress;
 mod render;
 mod scene;
+mod serve;
 mod shell;
 mod signals;
 mod stage;
@@ -26,6 +27,7 @@ mod warnings;
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::processor;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use std::ffi::OsString;
 use std::fs::File;
 use std::io::Write;
 use std::num::NonZero;
@@ -58,6 +60,8 @@ enum Command {
     Converge(Box<converge::ConvergeArgs>),
     /// Show what a scene or an EXR contains
     Info(info::InfoArgs),
+    /// Keep a scene and render it as often as another program asks, by commands on standard input
+    Serve(serve::ServeArgs),
     /// Show which Embree, ONNX Runtime, Open Image Denoise and USD are found, and how to install missing ones
     Doctor(doctor::DoctorArgs),
     /// Print a script that completes commands and options in a shell
@@ -106,7 +110,7 @@ pub fn main() -> ExitCode {
             }
         },
     };
-    let command = match stage::add_stage_options(cli.command, &mut line) {
+    let command = match stage::add_stage_options(cli.command, std::env::args_os().collect(), &mut line) {
         Ok(command) => command,
         Err(error) => return fail(&error),
     };
@@ -118,6 +122,7 @@ pub fn main() -> ExitCode {
         Command::Compare(args) => compare::run(&args),
         Command::Converge(args) => converge::run(&args),
         Command::Info(args) => info::run(&args),
+        Command::Serve(args) => serve::run(&args),
         Command::Doctor(args) => doctor::run(&args),
         Command::Completions(args) => shell::complete(&args, command_line()),
         Command::Man(args) => shell::man(&args, command_line()),
@@ -126,6 +131,27 @@ pub fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => fail(&error),
+    }
+}
+
+/// Parses the options of `caustique render` in `words`: the path of the scene, and options.
+///
+/// # Errors
+/// An option is wrong, or asks for help.
+fn parse_render(words: &[String]) -> Result<render::RenderArgs> {
+    let before = ["caustique", "render", "--progress", "json"].map(OsString::from);
+    let words: Vec<OsString> = before.into_iter().chain(words.iter().map(OsString::from)).collect();
+    let mut line = command_line();
+    let parsed = line.try_get_matches_from_mut(&words).and_then(|matches| Cli::from_arg_matches(&matches));
+    let command = parsed.map_err(|error| {
+        let explained = usage::explain(&error, line.find_subcommand("render"));
+        explained.unwrap_or_else(|| Error::usage("the options ask for help").hint("run 'caustique render --help'"))
+    })?;
+    match stage::add_stage_options(command.command, words, &mut line)? {
+        Command::Render(args) => Ok(*args),
+        _ => {
+            Err(Error::usage("these are no options of 'caustique render'").hint("'caustique render --help' lists them"))
+        }
     }
 }
 

@@ -14,6 +14,14 @@ use std::sync::{Arc, OnceLock};
 #[derive(Clone, Debug)]
 pub struct Interrupt(Arc<AtomicBool>);
 
+/// How another program stops a render, in place of signals.
+pub struct Control {
+    /// Ends the iterations, also within one.
+    pub stop: Stop,
+    /// Whether nobody wants the picture any more.
+    pub abandons: Box<dyn Fn() -> bool>,
+}
+
 /// The flag that the first signal sets, once the handlers are installed.
 static INSTALLED: OnceLock<Interrupt> = OnceLock::new();
 

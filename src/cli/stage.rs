@@ -10,12 +10,12 @@ use std::ffi::OsString;
 /// Prefix of the argument that names the output of a USD RenderProduct; nothing follows if the product has no name.
 const OUTPUT_PREFIX: &str = "--output=";
 
-/// Parses the command line again with the options of its USD stage in front, so that those of the command line take
+/// Parses the command line, `words`, again with the options of its USD stage in front, so that those of the command line take
 /// precedence. `plan` takes only the options that it has.
 ///
 /// # Errors
 /// The stage cannot be read, or its options do not exist or contradict the command line.
-pub fn add_stage_options(command: Command, line: &mut clap::Command) -> Result<Command> {
+pub fn add_stage_options(command: Command, mut words: Vec<OsString>, line: &mut clap::Command) -> Result<Command> {
     let (scene, known) = match &command {
         Command::Render(args) => (&args.options.scene, None),
         Command::Plan(args) => (args.scene(), line.find_subcommand("plan")),
@@ -38,7 +38,6 @@ pub fn add_stage_options(command: Command, line: &mut clap::Command) -> Result<C
     if said.is_empty() {
         return Ok(command);
     }
-    let mut words: Vec<OsString> = std::env::args_os().collect();
     let at = words.len().min(2);
     words.splice(at..at, said.into_iter().map(OsString::from));
     let name = words.get(1).cloned().unwrap_or_default();

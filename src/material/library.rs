@@ -135,6 +135,31 @@ impl Material {
         .flatten()
     }
 
+    /// The references to textures, to change them.
+    pub fn textures_mut(&mut self) -> impl Iterator<Item = &mut TextureRef> {
+        [
+            self.base_color_texture.as_mut(),
+            self.metallic_roughness_texture.as_mut(),
+            self.normal_texture.as_mut().map(|(texture, _)| texture),
+            self.emission_texture.as_mut(),
+            self.transmission_texture.as_mut(),
+            self.diffuse_transmission_texture.as_mut(),
+            self.diffuse_transmission_color_texture.as_mut(),
+            self.specular_texture.as_mut(),
+            self.specular_color_texture.as_mut(),
+            self.iridescence_texture.as_mut(),
+            self.iridescence_thickness_texture.as_mut(),
+            self.clearcoat_texture.as_mut(),
+            self.clearcoat_roughness_texture.as_mut(),
+            self.clearcoat_normal_texture.as_mut().map(|(texture, _)| texture),
+            self.sheen_color_texture.as_mut(),
+            self.sheen_roughness_texture.as_mut(),
+            self.anisotropy_texture.as_mut(),
+        ]
+        .into_iter()
+        .flatten()
+    }
+
     /// Whether the material fills a solid whose index of refraction depends on the wavelength.
     #[inline]
     pub fn disperses(&self) -> bool {

@@ -209,6 +209,7 @@ impl RenderOptions {
         let filter = self.filter.as_deref().map_or(Ok(Filter::default()), filter)?;
         Ok(CameraRequest {
             camera: self.camera.clone(),
+            own: None,
             orbit: self.orbit,
             width: self.size.width,
             height: self.size.height,

@@ -92,12 +92,13 @@ pub fn load_bytes(bytes: &[u8], request: &SceneRequest, threads: usize) -> Resul
     Ok(Loaded { file, ..build(description, request, threads)? })
 }
 
-fn check_memory(request: &SceneRequest, threads: usize) -> Result<()> {
+pub(super) fn check_memory(request: &SceneRequest, threads: usize) -> Result<()> {
     memory::require(EMBREE_BYTES + threads as u64 * EMBREE_BYTES_PER_THREAD, "Embree and its threads")
         .map_err(|e| e.within(request.path.display()).hint("give the program more memory, or fewer --threads"))
 }
 
-fn build(mut description: Description, request: &SceneRequest, threads: usize) -> Result<Loaded> {
+/// Builds the scene of a description, with the environment and the effects of the request.
+pub(super) fn build(mut description: Description, request: &SceneRequest, threads: usize) -> Result<Loaded> {
     set_environment(&mut description, request)?;
     if let Some(hidden) = request.background_hidden {
         description.picture.film_transparent = hidden;

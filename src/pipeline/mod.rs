@@ -12,11 +12,13 @@ pub mod check;
 pub mod checkpoint;
 pub mod choose;
 mod deliver;
+pub mod edit;
 mod facts;
 pub mod finish;
 mod finished_error;
 mod forecast;
 pub mod layers;
+pub mod live;
 pub mod load;
 pub mod memory;
 pub mod merge;
@@ -48,7 +50,7 @@ pub use rendered_file::RenderedFile;
 pub use request::{AutoRequest, MethodRequest, PictureRequest, Request, Saving};
 pub use worst::{Place, Tile, Worst};
 
-use crate::error::Result;
+use crate::error::{Error, ErrorKind, Result};
 use crate::film::MOTION;
 use crate::render::{Motion, RenderInput, Rendered, Settings};
 use crate::scene::View;
@@ -96,6 +98,9 @@ pub fn render_loaded(request: Request<'_>, loaded: &Loaded, observer: &mut dyn O
         .with_motion(motion.as_ref().map(|motion| motion as &dyn Motion));
     let running = Running::start(&request, &stage, &chosen, prepared, resumption, facts.frame, observer)?;
     let iterated = running.iterate(observer)?;
+    if observer.abandons() {
+        return Err(Error::new(ErrorKind::Interrupted, "", "the picture is not wanted any more"));
+    }
     observer.event(Event::Rendered(&iterated.rendered));
     let Rendered { settings, stats, .. } = &iterated.rendered;
     // Before the render, the plan warns of a small number of iterations that was asked for.

@@ -86,6 +86,11 @@ pub trait Observer {
     /// The flag by which the user stops the render, also within an iteration.
     fn stop(&self) -> Stop;
 
+    /// Whether nobody wants the picture any more when the iterations have ended, so that it is not delivered.
+    fn abandons(&self) -> bool {
+        false
+    }
+
     /// Whether to send an [`Event::Preview`] after the current iteration.
     fn wants_preview(&mut self) -> bool {
         false

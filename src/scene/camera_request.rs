@@ -26,6 +26,8 @@ pub const MAX_SIZE: u32 = 32_768;
 pub struct CameraRequest {
     /// Name of the camera; `None`: the scene's first camera.
     pub camera: Option<String>,
+    /// A camera that the scene does not have, which replaces its cameras; `None`: one of them.
+    pub own: Option<CameraDescription>,
     /// A view of the whole scene instead of a camera; `None`: the camera, or the default view if the scene has none.
     pub orbit: Option<Orbit>,
     /// Width of the whole picture in pixels; `None`: from the scene, or from the height.
@@ -191,13 +193,16 @@ impl Scene {
         Ok(camera.with_shift(described.shift.into()).with_filter(request.filter))
     }
 
-    /// The camera of the request: a view of the whole scene, the one of a name among `cameras`, or the first of them.
-    /// Without cameras it is the default view.
+    /// The camera of the request: its own, a view of the whole scene, the one of a name among `cameras`, or the first of
+    /// them. Without cameras it is the default view.
     fn described_camera<'c>(
         &self,
         cameras: &'c [CameraDescription],
         request: &CameraRequest,
     ) -> Result<Cow<'c, CameraDescription>> {
+        if let Some(own) = &request.own {
+            return Ok(Cow::Owned(own.clone()));
+        }
         let Some(name) = request.camera.as_deref() else {
             return match (request.orbit, cameras.first()) {
                 (None, Some(first)) => Ok(Cow::Borrowed(first)),

@@ -6,6 +6,7 @@ pub mod contact;
 mod contacts;
 mod dense;
 pub mod description;
+mod edit;
 pub mod environment_file;
 mod folder;
 pub mod gltf;

@@ -154,7 +154,7 @@ class Text(unittest.TestCase):
             self.assertIn(f"({page.relative_to(folder)}", text)
 
     def test_options_that_are_named_exist(self):
-        names = ("render", "plan", "finish", "merge", "compare", "converge", "info", "doctor")
+        names = ("render", "plan", "finish", "merge", "compare", "converge", "info", "serve", "doctor")
         known = "".join(support.run([*words, "--help"], check=0).stdout for words in ([], *([name] for name in names)))
         for script in ("scripts/blender/export.py", "scripts/farm/ray_render.py", "scripts/farm/slurm.sh", "tests/hard/run.py"):
             known += (support.ROOT / script).read_text(encoding="utf-8")

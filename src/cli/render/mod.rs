@@ -11,14 +11,14 @@ pub use options::RenderArgs;
 
 use super::finish_options::warn_missing_denoiser;
 use super::progress::{FrameOfRun, Reporter, Waiting};
-use super::signals::Interrupt;
+use super::signals::{Control, Interrupt};
 use super::warnings::lines;
 use super::{events, output, say, scene};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::LayerSet;
 use caustique::options::SceneOptions;
 use caustique::pipeline::plan::reason;
-use caustique::pipeline::{self, Delivery, Event, Observer, Phase, Request};
+use caustique::pipeline::{self, Delivery, Event, Loaded, Observer, Phase, Request};
 use caustique::plan::Plan;
 use caustique::render::Settings;
 use caustique::scene::Scene;
@@ -47,6 +47,25 @@ pub fn run(args: &RenderArgs) -> Result<()> {
 
 /// Renders one picture, of a scene or of a frame. Everything that can be wrong is found before the first light path.
 fn render_one(args: &RenderArgs, turn: Option<FrameOfRun>) -> Result<()> {
+    let request = check(args)?;
+    let mut reports = Reports::new(args, turn);
+    let delivery = pipeline::render(request, &mut reports).map_err(|error| reports.explain(error))?;
+    reports.deliver(delivery)
+}
+
+/// Renders one picture of a scene that has been loaded, as another program asks.
+///
+/// # Errors
+/// Errors of [`run`].
+pub fn render_loaded(args: &RenderArgs, loaded: &Loaded, control: Control) -> Result<()> {
+    let request = check(args)?;
+    let mut reports = Reports { control: Some(control), ..Reports::new(args, None) };
+    let delivery = pipeline::render_loaded(request, loaded, &mut reports)?;
+    reports.deliver(delivery)
+}
+
+/// Checks the options of a render and its files. Returns the request for the pipeline.
+fn check(args: &RenderArgs) -> Result<Request<'_>> {
     let picture = args.picture_request()?;
     let layers = args.selection()?;
     output::check_render(&args.output)?;
@@ -56,7 +75,7 @@ fn render_one(args: &RenderArgs, turn: Option<FrameOfRun>) -> Result<()> {
     args.preview.as_ref().map_or(Ok(()), |target| target.check(&args.output))?;
     files::check_checkpoint(args)?;
     techniques::prepare(args)?;
-    let request = Request {
+    Ok(Request {
         scene: args.options.scene.request(),
         picture,
         finish: (!args.options.no_finish).then(|| args.options.finish.request()),
@@ -67,10 +86,7 @@ fn render_one(args: &RenderArgs, turn: Option<FrameOfRun>) -> Result<()> {
         memory: args.run.memory_limit(),
         saving: args.saving(),
         resume: args.run.resume.clone(),
-    };
-    let mut reports = Reports::new(args, turn);
-    let delivery = pipeline::render(request, &mut reports).map_err(|error| reports.explain(error))?;
-    reports.deliver(delivery)
+    })
 }
 
 /// Reports the progress of a render to people and programs, and writes its files.
@@ -78,6 +94,8 @@ struct Reports<'a> {
     args: &'a RenderArgs,
     turn: Option<FrameOfRun>,
     interrupt: Option<Interrupt>,
+    /// How another program stops the render; `None`: signals do.
+    control: Option<Control>,
     waiting: Option<Waiting>,
     reporter: Option<Reporter>,
     preview: Option<Preview<'a>>,
@@ -98,7 +116,7 @@ impl Observer for Reports<'_> {
     fn accept(&mut self, scene: &Scene) -> Result<()> {
         scene::print_warnings(&self.args.options.scene, &scene.warnings)?;
         self.made_for = scene.picture;
-        self.interrupt = Some(Interrupt::install()?);
+        self.interrupt = if self.control.is_none() { Some(Interrupt::install()?) } else { None };
         Ok(())
     }
 
@@ -138,7 +156,11 @@ impl Observer for Reports<'_> {
     }
 
     fn stop(&self) -> Stop {
-        Interrupt::stop()
+        self.control.as_ref().map_or_else(Interrupt::stop, |control| control.stop.clone())
+    }
+
+    fn abandons(&self) -> bool {
+        self.control.as_ref().is_some_and(|control| (control.abandons)())
     }
 
     fn wants_preview(&mut self) -> bool {
@@ -152,6 +174,7 @@ impl<'a> Reports<'a> {
             args,
             turn,
             interrupt: None,
+            control: None,
             waiting: None,
             reporter: None,
             preview: None,

@@ -27,7 +27,7 @@ pub(super) fn local(raw: &Value, place: &str) -> Result<DAffine3> {
 }
 
 /// The transform of a column-major 4 x 4 matrix. `None` if its last row is not 0, 0, 0, 1.
-pub(super) fn affine(m: [f64; 16]) -> Option<DAffine3> {
+pub fn affine(m: [f64; 16]) -> Option<DAffine3> {
     let column = |i: usize| DVec3::new(m[i], m[i + 1], m[i + 2]);
     let transform = DAffine3 { matrix3: DMat3::from_cols(column(0), column(4), column(8)), translation: column(12) };
     ([m[3], m[7], m[11], m[15]] == [0.0, 0.0, 0.0, 1.0]).then_some(transform)
@@ -41,12 +41,12 @@ pub(super) fn compose(t: Option<[f64; 3]>, r: Option<[f64; 4]>, s: Option<[f64; 
     Some(DAffine3::from_scale_rotation_translation(s, glam::DQuat::from_vec4(rotation), t))
 }
 
-pub(super) fn is_finite(transform: &DAffine3) -> bool {
+pub(in crate::scene) fn is_finite(transform: &DAffine3) -> bool {
     transform.matrix3.is_finite() && transform.translation.is_finite()
 }
 
 /// Whether a transform has an inverse that f32 can represent.
-pub(super) fn is_invertible(transform: &DAffine3) -> bool {
+pub(in crate::scene) fn is_invertible(transform: &DAffine3) -> bool {
     let inverse = transform.matrix3.inverse();
     transform.matrix3.determinant() != 0.0
         && inverse.is_finite()
