@@ -33,12 +33,13 @@ use crate::error::Result;
 use crate::estimator::QUARTERS;
 use crate::film::kind::Use;
 use crate::film::{
-    CAUSTIC, LIGHT_GROUP, Layer, LayerSet, Picture, Size, finished_part, kind_of, lobe_names, part_names,
+    CAUSTIC, LIGHT_GROUP, LOBE_COLORS, Layer, LayerSet, Picture, Size, finished_part, kind_of, lobe_names, part_names,
 };
 use bound::Noise;
 use estimate::{alpha, estimate_layers, own_level};
 use finished_error::ErrorEstimator;
 use parts::Part;
+use rayon::prelude::*;
 
 /// Bytes of memory per pixel that a finish without parts needs beside its layers: the estimates by all and by half of
 /// the iterations, their pictures, the quarters, and the buffers of the error estimate.
@@ -98,6 +99,38 @@ pub struct Prepared {
     combined: Option<usize>,
     /// The additive parts of the estimate that are finished too.
     parts: Vec<Named>,
+    /// The layers [`LOBE_COLORS`] of the frame.
+    colors: Vec<Named>,
+}
+
+impl Prepared {
+    /// The same pictures with the colours of lobes that a layer set of the frame has. Where a lobe's colour is black and the
+    /// frame itself has no light in it, light of other frames is taken from it.
+    #[must_use]
+    pub fn with_colors_of(mut self, set: &LayerSet) -> Prepared {
+        self.colors = lobe_colors(set);
+        for (name, part) in &mut self.parts {
+            let Some((color, own)) = color_of(name, &self.colors).zip(set.picture(name)) else { continue };
+            part.par_iter_mut().enumerate().for_each(|(index, value)| {
+                for c in (0..3).filter(|c| color[index][*c] <= 0.0 && own[index][*c] <= 0.0) {
+                    value[c] = 0.0;
+                }
+            });
+        }
+        self
+    }
+}
+
+/// The colour of the lobe that a layer, finished or not, has the light of.
+fn color_of<'c>(layer: &str, colors: &'c [Named]) -> Option<&'c Picture> {
+    let part = layer.trim_start_matches("Combined");
+    let of_lobe = |color: &str| color.strip_suffix("Color").is_some_and(|lobe| part.starts_with(lobe));
+    colors.iter().find(|(color, _)| of_lobe(color)).map(|(_, picture)| picture)
+}
+
+/// The layers of a set with the colours of lobes.
+fn lobe_colors(set: &LayerSet) -> Vec<Named> {
+    LOBE_COLORS.iter().filter_map(|name| Some(((*name).to_owned(), set.picture(name)?))).collect()
 }
 
 /// Pictures that [`Finish::deliver`] estimates the error by.
@@ -255,7 +288,7 @@ impl Finish {
         let names = parts_to_finish(set, &wanted);
         let parts = names.into_iter().filter_map(|name| set.picture(&name).map(|picture| (name, picture))).collect();
         let error = ErrorSource::of(set, own_level(set));
-        let prepared = Prepared { estimate, denoised, half, combined, parts };
+        let prepared = Prepared { estimate, denoised, half, combined, parts, colors: lobe_colors(set) };
         self.deliver(prepared, error, wanted)?.insert_into(set)
     }
 
@@ -301,7 +334,7 @@ impl Finish {
         };
         let average = temporal::average(window, finish_half, parts)?;
         let temporal::Averaged { estimate, denoised, combined, half, parts } = average;
-        Some(Prepared { estimate, denoised, half, combined, parts })
+        Some(Prepared { estimate, denoised, half, combined, parts, colors: Vec::new() })
     }
 
     /// Finishes an estimate and its parts, and estimates the error. `wanted` accepts the names of layers to make.
@@ -314,13 +347,13 @@ impl Finish {
         error: Option<ErrorSource>,
         wanted: impl Fn(&str) -> bool,
     ) -> Result<FinishedPicture> {
-        let Prepared { estimate, denoised, half, combined, parts } = prepared;
+        let Prepared { estimate, denoised, half, combined, parts, colors } = prepared;
         let error = half.zip(error).map(|(half, source)| error_by_quarters(&source, &estimate, &half, wanted(ERROR)));
         let (error, error_map) = error.unzip();
         let ([picture, spread], clamped) = displaced(&estimate, &denoised);
         drop(denoised);
         let noise = Noise { estimate: &estimate, spread: &spread };
-        let parts = self.parts(parts, &picture, noise, wanted)?;
+        let parts = self.parts((parts, &colors), &picture, noise, wanted)?;
         let account = Finished { combined, error, error_map: error_map.flatten(), clamped };
         Ok(FinishedPicture { picture, parts, account })
     }
@@ -341,7 +374,7 @@ impl Finish {
     /// the picture, or to its caustics, are all finished if one of them is wanted.
     fn parts(
         &mut self,
-        parts: Vec<Named>,
+        (parts, colors): (Vec<Named>, &[Named]),
         picture: &Picture,
         noise: Noise<'_>,
         wanted: impl Fn(&str) -> bool,
@@ -361,28 +394,28 @@ impl Finish {
         let all_caustics = effects.iter().find(of_caustics).filter(|_| any(&caustics)).map(|(_, mean)| mean.clone());
         let mut finished = Vec::new();
         if any(&effects) || any(&caustics) {
-            finished.extend(self.split(effects, picture, noise)?);
+            finished.extend(self.split(effects, picture, noise, &[])?);
         }
         if any(&groups) {
             let groups = with_rest(groups, &noise.estimate.mean);
-            finished.extend(self.split(groups, picture, noise)?);
+            finished.extend(self.split(groups, picture, noise, &[])?);
         }
         // They sum to the picture only together. Other renderers have layers with some of these names.
         if lobes.len() == lobe_names().count() && any(&lobes) {
-            finished.extend(self.split(lobes, picture, noise)?);
+            finished.extend(self.split(lobes, picture, noise, colors)?);
         }
         let whole = all_caustics.zip(finished.iter().find(of_caustics).cloned());
         if let Some((mean, (_, whole))) = whole {
             let caustics = with_rest(caustics, &mean);
-            finished.extend(self.split(caustics, &whole, noise)?);
+            finished.extend(self.split(caustics, &whole, noise, &[])?);
         }
         finished.retain(|(name, _)| !name.is_empty() && wanted(name));
         Ok(finished)
     }
 
     /// Finishes named parts so that they sum to the picture `whole`, with the guides and standard errors of the whole
-    /// picture.
-    fn split(&mut self, parts: Vec<Named>, whole: &Picture, noise: Noise<'_>) -> Result<Vec<Named>> {
+    /// picture. `colors` has the colours of lobes, if the parts are those of lobes.
+    fn split(&mut self, parts: Vec<Named>, whole: &Picture, noise: Noise<'_>, colors: &[Named]) -> Result<Vec<Named>> {
         let mut of_part = noise.estimate.clone();
         let (mut names, mut estimates) = (Vec::with_capacity(parts.len()), Vec::with_capacity(parts.len()));
         for (name, mean) in parts {
@@ -397,7 +430,8 @@ impl Finish {
             names.push(name);
             estimates.push(Part { mean: std::mem::take(&mut of_part.mean), denoised });
         }
-        let finished = parts::split(&estimates, whole, noise);
+        let colors: Vec<Option<&Picture>> = names.iter().map(|name| color_of(name, colors)).collect();
+        let finished = parts::split(&estimates, whole, noise, &colors);
         Ok(names.into_iter().zip(finished).collect())
     }
 }

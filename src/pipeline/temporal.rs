@@ -4,7 +4,7 @@ use super::deliver::write_finish;
 use super::finish::OpenFinish;
 use super::rendered_file::RenderedFile;
 use crate::error::{Error, ErrorKind, Result};
-use crate::film::{Layer, LayerSet};
+use crate::film::{LOBE_COLORS, Layer, LayerSet, lobe_names};
 use crate::finish::temporal::{self, REACH, WINDOW};
 use crate::finish::{ERROR, ErrorSource, Finish, Finished, parts_to_finish};
 use crate::image::exr::{self, Attributes};
@@ -83,6 +83,8 @@ impl FrameFiles {
         let (window, averaged) = self.averaged(number);
         let average = Finish::average(&window, &parts_to_finish(&header, wanted));
         let average = average.ok_or_else(|| Error::new(ErrorKind::Io, path.display(), "there is no such frame"))?;
+        let of_lobes: Vec<String> = LOBE_COLORS.into_iter().chain(lobe_names()).map(String::from).collect();
+        let average = average.with_colors_of(&self.layers(number, &of_lobes)?);
         // The windows of later frames lack the first frame of this one.
         self.held.retain(|frame, _| frame + REACH as u32 > number);
         let error = ErrorSource::read(&header, |names| self.layers(number, names))?;

@@ -36,12 +36,47 @@ fn layers_add_up_after_the_finish() {
         let (done, _) = folder.read("done.exr");
         check_sum(&done, "", "Noisy", method);
         check_sum(&done, "Combined", "", method);
+        check_black(&done, method);
         run(&folder, &format!("{arguments},Quarter --no-finish -o raw.exr"));
         run(&folder, "finish raw.exr -o later.exr --denoise own");
         let (later, _) = folder.read("later.exr");
         check_sum(&later, "Combined", "", method);
         assert!(values(&later, "CombinedGlossyDirect") == values(&done, "CombinedGlossyDirect"), "{method}");
         assert!(done.get("DiffuseColor").is_some() && later.get("TransmissionColor").is_some());
+    }
+}
+
+/// The finish brings no light to lobes of black colour, which compositors divide by.
+fn check_black(set: &LayerSet, what: &str) {
+    let mut black = 0;
+    for lobe in ["Diffuse", "Glossy", "Transmission"] {
+        let color = values(set, &format!("{lobe}Color"));
+        for end in ["Direct", "Indirect"] {
+            let [light, finished] = ["", "Combined"].map(|beginning| values(set, &format!("{beginning}{lobe}{end}")));
+            for (index, color) in color.iter().enumerate() {
+                for c in (0..3).filter(|c| color[*c] == 0.0 && light[index][*c] == 0.0) {
+                    black += 1;
+                    assert_eq!(finished[index][c], 0.0, "{what}: {lobe}{end}, pixel {index}");
+                }
+            }
+        }
+    }
+    assert!(black > 1000, "{what}: {black}");
+}
+
+/// The temporal finish of frames divides them among the lobes, too.
+#[test]
+fn layers_add_up_after_the_temporal_finish() {
+    let folder = Folder::new();
+    let arguments = format!("{COMMON} --method path --iterations 4 --layers all,lobes --denoise own --frames 1-3");
+    run(&folder, &format!("{arguments} --temporal -o out.#.exr"));
+    run(&folder, &format!("{arguments} -o alone.#.exr"));
+    for frame in 1..=3 {
+        let set = folder.read(&format!("out.{frame}.exr")).0;
+        check_sum(&set, "Combined", "", &format!("frame {frame}"));
+        check_black(&set, &format!("frame {frame}"));
+        let alone = folder.read(&format!("alone.{frame}.exr")).0;
+        assert!(values(&set, "CombinedDiffuseDirect") != values(&alone, "CombinedDiffuseDirect"), "frame {frame}");
     }
 }
 
