@@ -199,6 +199,7 @@ mod tests {
                 material: index,
                 object: index,
                 hidden_from_camera: false,
+                shadow_catcher: false,
                 light_group: None,
                 moves: false,
                 to_world: DAffine3::IDENTITY,
