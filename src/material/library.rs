@@ -139,6 +139,7 @@ impl Material {
     pub fn textures_mut(&mut self) -> impl Iterator<Item = &mut TextureRef> {
         [
             self.base_color_texture.as_mut(),
+            self.diffuse_roughness_texture.as_mut(),
             self.metallic_roughness_texture.as_mut(),
             self.normal_texture.as_mut().map(|(texture, _)| texture),
             self.emission_texture.as_mut(),
@@ -151,6 +152,8 @@ impl Material {
             self.iridescence_thickness_texture.as_mut(),
             self.clearcoat_texture.as_mut(),
             self.clearcoat_roughness_texture.as_mut(),
+            self.clearcoat_ior_texture.as_mut(),
+            self.clearcoat_color_texture.as_mut(),
             self.clearcoat_normal_texture.as_mut().map(|(texture, _)| texture),
             self.sheen_color_texture.as_mut(),
             self.sheen_roughness_texture.as_mut(),
