@@ -9,7 +9,7 @@ use crate::estimator::InitialBandwidth;
 use crate::estimator::bandwidth::MIN_USER_RADIUS_RATIO;
 use crate::plan::Search;
 use crate::render::output::layer_shape;
-use crate::render::{Candidate, Method, Settings};
+use crate::render::{Candidate, Settings};
 use crate::scene::{Scene, View};
 use crate::transport::Indirect;
 use std::path::Path;
@@ -84,7 +84,7 @@ pub(super) fn renders_catchers(settings: &Settings, scene: &Scene) -> bool {
 /// if the density of a medium varies.
 fn check_media(settings: &Settings, path: &Path, scene: &Scene) -> Result<()> {
     let method = settings.method;
-    if scene.survey.grids && method == Method::Mlt {
+    if scene.survey.grids && method.has_chains() {
         let cause = format!("--method {} does not render media whose density varies", method.name());
         let error = Error::new(ErrorKind::Usage, path.display(), cause);
         return Err(error.hint("choose --method path, light, bdpt, vcm, sppm or cppm"));
