@@ -1,6 +1,7 @@
-"""The render engine, for F12 and animations.
+"""The render engine, for F12, animations and the viewport.
 
-Blender calls `render` for each view layer of each frame, in a thread beside the interface.
+Blender calls `render` for each view layer of each frame, in a thread beside the interface. `view_update` and `view_draw`
+are for viewports with the shading 'Rendered', each of which has an engine of its own.
 """
 
 import contextlib
@@ -12,7 +13,7 @@ import time
 import bpy
 import numpy
 
-from . import command, exr, handoff, ignored_settings, passes, preferences, program, resume, run, session
+from . import command, exr, handoff, ignored_settings, passes, preferences, program, resume, run, session, viewport
 from .fault import Cancelled, fault_from_error
 
 _POLL_SECONDS = 0.1  # between two checks of the program's progress
@@ -27,6 +28,37 @@ class Engine(bpy.types.RenderEngine):
     bl_use_preview = False
     bl_use_eevee_viewport = True
     bl_use_shading_nodes_custom = False
+    _viewport = None  # the `viewport.Viewport` of an engine that draws one
+
+    def __del__(self):
+        view = self.__dict__.get("_viewport") if hasattr(self, "__dict__") else None
+        if view is not None:
+            view.close()
+
+    def view_update(self, context, depsgraph):
+        """Take changes of the scene that a viewport shows."""
+        try:
+            if self._viewport is None:
+                self._viewport = viewport.Viewport(depsgraph.scene, depsgraph.view_layer)
+            self._viewport.update(depsgraph)
+        except Exception as error:  # Blender would print it and go on
+            self.error_set(fault_from_error(error).message())
+
+    def view_draw(self, context, depsgraph):
+        """Draw the picture so far in a viewport."""
+        if self._viewport is None:
+            return
+        region, space, view = context.region, context.space_data, context.region_data
+        camera = space.camera if view.view_perspective == "CAMERA" else None
+        is_camera = camera is not None and camera.type == "CAMERA"
+        flat = is_camera and camera.data.type == "ORTHO"
+        step = max(_pixel_size(depsgraph.scene.render.preview_pixel_size), 1)
+        size = (max(region.width // step, 1), max(region.height // step, 1))
+        back = 0.0 if view.is_perspective or is_camera else space.clip_end / 2
+        lens = viewport.lens(camera, flat) if is_camera else None
+        self._viewport.want(view.view_matrix, view.window_matrix, back, size, lens)
+        text, fault = self._viewport.draw(self, depsgraph.scene, (region.width, region.height))
+        self.update_stats("", text if fault is None else f"caustique: {fault.what}. {fault.remedy}")
 
     def update_render_passes(self, scene=None, renderlayer=None):
         """Register the passes that the view layer enables."""
@@ -140,6 +172,11 @@ class Engine(bpy.types.RenderEngine):
             if line not in known:  # frames and view layers repeat most warnings
                 known.append(line)
                 self.report({"WARNING"}, line)
+
+
+def _pixel_size(name):
+    """The pixels of the region per pixel of the picture, by Blender's setting Pixel Size."""
+    return 1 if name == "AUTO" else int(name)
 
 
 def _part(render, width, height):
