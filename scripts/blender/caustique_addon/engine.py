@@ -31,9 +31,10 @@ class Engine(bpy.types.RenderEngine):
     _viewport = None  # the `viewport.Viewport` of an engine that draws one
 
     def __del__(self):
-        view = self.__dict__.get("_viewport") if hasattr(self, "__dict__") else None
-        if view is not None:
-            view.close()
+        # Blender may have removed the engine of a render, which has no viewport.
+        with contextlib.suppress(ReferenceError):
+            if self._viewport is not None:
+                self._viewport.close()
 
     def view_update(self, context, depsgraph):
         """Take changes of the scene that a viewport shows."""
