@@ -448,7 +448,8 @@ impl Reader<'_> {
             // A medium is homogeneous: docs/scene-format.md explains why.
             color *= self.textures.list[texture.texture as usize].mean().truncate().clamp(Rgb::ZERO, Rgb::ONE);
             self.warnings.push(format!(
-                "{}: the mean of its multiscatterColorTexture is taken; a diffuseTransmissionColorTexture varies the                  colour of the light that leaves",
+                "{}: the mean of its multiscatterColorTexture is taken; a diffuseTransmissionColorTexture varies the \
+                 colour of the light that leaves",
                 self.place
             ));
         }

@@ -19,7 +19,7 @@ const LOADERS: [&str; 10] = [
 ];
 
 /// Texts that no case can produce, and the reason.
-const UNSAID: [(&str, &[&str]); 6] = [
+const UNSAID: [(&str, &[&str]); 7] = [
     (
         "there is memory enough where tests run",
         &[
@@ -61,6 +61,14 @@ const UNSAID: [(&str, &[&str]); 6] = [
             "the decoder failed",
             "the file contradicts itself",
             "its size contradicts its header",
+        ],
+    ),
+    (
+        "it is about a file beside the scene",
+        &[
+            "medium.density must be a grid of one channel",
+            "its angles times {scale} leave no light",
+            "give another angle_scale",
         ],
     ),
     ("no mesh has a rim of one edge", &["edge has one face only"]),
