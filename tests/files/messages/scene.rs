@@ -403,7 +403,7 @@ fn patterns() -> Cases {
         ("a folder as a profile", json!({ies: {"file": "."}})),
         ("a rotation beyond numbers", json!({ies: {"bufferView": 0, "rotation_deg": 1e300}})),
         ("divided by an area", json!({ies: {"bufferView": 0, "normalize": "area"}})),
-        ("a bulb of a ball", json!({"/nodes/2/extras/caustique/bulb": true})),
+        ("a bulb of a ball", json!({format!("{lamp}/type"): "point", "/nodes/2/extras/caustique/bulb": true})),
         ("a bulb of the sun", json!({format!("{lamp}/type"): "directional", "/nodes/2/extras/caustique/bulb": true})),
         ("a sun with a profile", json!({format!("{lamp}/type"): "directional", ies: {"bufferView": 0}})),
         ("no such profile", json!({listed: [], on_node: {"light": 0}})),
