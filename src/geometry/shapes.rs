@@ -2,7 +2,7 @@
 
 use super::mesh::PackedMesh;
 use super::{Instance, Mesh, Surface};
-use crate::math::Vec3;
+use crate::math::{Vec3, bounding_box};
 use crate::processor::prefetch;
 use std::sync::Arc;
 
@@ -50,7 +50,7 @@ impl Shapes {
     /// The bounding box of all instances: its lowest and its highest corner. The first exceeds the second without
     /// vertices.
     pub fn bounds(&self) -> (Vec3, Vec3) {
-        self.points().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))
+        bounding_box(self.points())
     }
 
     /// Number of triangles of all instances.

@@ -7,7 +7,7 @@
 use super::{Cdf, EmissionSample, EntryDisc, Region, Sky};
 use crate::geometry::Shapes;
 use crate::material::Materials;
-use crate::math::{Frame, Vec2, Vec3, warp};
+use crate::math::{Frame, Vec2, Vec3, bounding_box, warp};
 use std::f32::consts::PI;
 
 /// Share of the light paths from infinity that start on the disc of a caustic target, an object that can make caustics.
@@ -46,8 +46,7 @@ pub struct CausticTargets {
 
 /// Centre and radius of a sphere around points, centred in their bounding box; `None` without points.
 fn bounding_sphere(points: impl Iterator<Item = Vec3> + Clone) -> Option<(Vec3, f32)> {
-    let (low, high) =
-        points.clone().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
+    let (low, high) = bounding_box(points.clone());
     let center = (low + high) * 0.5;
     let radius2 = points.map(|p| p.distance_squared(center)).fold(0.0, f32::max);
     (center.is_finite() && radius2 > 0.0).then(|| (center, radius2.sqrt()))
@@ -86,8 +85,7 @@ fn spatially_merged(spheres: Vec<(Vec3, f32)>, most: usize) -> Vec<(Vec3, f32)> 
             groups.push(group);
             break;
         }
-        let (low, high) =
-            group.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), s| (low.min(s.0), high.max(s.0)));
+        let (low, high) = bounding_box(group.iter().map(|sphere| sphere.0));
         let extent = high - low;
         let axis = extent.to_array().iter().position(|&e| e == extent.max_element()).unwrap_or(0);
         group.sort_by(|a, b| a.0[axis].total_cmp(&b.0[axis]));

@@ -5,7 +5,7 @@ use super::spot::{SpotEdge, spot_solid_angle};
 use super::{Distribution, Environment, Spread};
 use crate::geometry::{Shapes, triangle_error};
 use crate::material::{EmissionGrid, Materials, MediumGrids};
-use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, luminance, warp};
+use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, bounding_box, corners, luminance, warp};
 use glam::Affine3A;
 use std::f32::consts::PI;
 use std::sync::Arc;
@@ -156,10 +156,8 @@ impl VolumeLight {
 
     /// Bounding box in world space.
     pub(super) fn bounds(&self) -> [Vec3; 2] {
-        let [low, high] = self.emission().map_or([Vec3::ZERO; 2], |emission| emission.grid().bounds());
-        let corner = |i: u32| Vec3::select(glam::BVec3::new(i & 1 == 1, i & 2 == 2, i & 4 == 4), high, low);
-        let corners = (0..8).map(|i| self.to_world.transform_point3(corner(i)));
-        corners.fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)])
+        let own = self.emission().map_or([Vec3::ZERO; 2], |emission| emission.grid().bounds());
+        bounding_box(corners(own.into()).map(|corner| self.to_world.transform_point3(corner))).into()
     }
 }
 

@@ -10,7 +10,7 @@ use crate::light::{
     Pattern, ShapedLight, Sky, SpotCone,
 };
 use crate::material::{Alpha, Material, Materials, MediumParameters, Scattering};
-use crate::math::{DAffine3, DVec3, Frame, Rgb, Vec3};
+use crate::math::{DAffine3, DVec3, Frame, Rgb, Vec3, bounding_box};
 use crate::texture::Texture;
 use crate::trace::{CAMERA_RAY_BIT, HitFilter, Tracer};
 use std::sync::Arc;
@@ -186,9 +186,7 @@ fn warn_of_cut_solids(shapes: &Shapes, materials: &Materials, warnings: &mut Vec
 fn warn_of_fires((shapes, materials): (&Shapes, &Materials), warnings: &mut Vec<String>) {
     for instance in &shapes.instances {
         let Some(emission) = materials.list[instance.material as usize].medium_emission() else { continue };
-        let positions = shapes.meshes[instance.mesh as usize].positions.iter();
-        let (low, high) =
-            positions.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)));
+        let (low, high) = bounding_box(shapes.meshes[instance.mesh as usize].positions.iter().copied());
         let [from, to] = emission.grid().bounds();
         let tolerance = MAX_FIRE_OUTSIDE * (to - from);
         if (from + tolerance).cmplt(low).any() || (to - tolerance).cmpgt(high).any() {
@@ -294,14 +292,7 @@ pub(super) fn rebuild_with_materials(
 
 /// World-space bounding sphere of all meshes, in f64: centre and radius. A unit sphere for a scene without meshes.
 fn bounding_sphere(description: &Description) -> (DVec3, f64) {
-    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for placed in &description.instances {
-        for p in &description.meshes[placed.mesh as usize].positions {
-            let p = placed.to_world.transform_point3(p.as_dvec3());
-            low = low.min(p);
-            high = high.max(p);
-        }
-    }
+    let (low, high) = description.bounds();
     if low.cmple(high).all() {
         ((low + high) * 0.5, ((high - low).length() * 0.5).max(1e-6))
     } else {

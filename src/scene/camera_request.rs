@@ -5,7 +5,7 @@ use super::description::{CameraDescription, Projection};
 use crate::camera::{self, Camera, Filter};
 use crate::error::{Error, ErrorKind, Result};
 use crate::geometry::Instance;
-use crate::math::{DAffine3, DMat3, DVec3, Mat3, Vec2, Vec3};
+use crate::math::{DAffine3, DMat3, DVec3, Mat3, Vec2, Vec3, bounding_box};
 use serde::Serialize;
 use std::borrow::Cow;
 use std::str::FromStr;
@@ -256,8 +256,7 @@ impl Scene {
         let back = DVec3::new(sa * ce, se, ca * ce);
         let right = DVec3::new(ca, 0.0, -sa);
         let matrix = DMat3::from_cols(right, back.cross(right), back);
-        let around = |(low, high): (Vec3, Vec3), p: Vec3| (low.min(p), high.max(p));
-        let (low, high) = self.framed_points().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), around);
+        let (low, high) = bounding_box(self.framed_points());
         let middle = if low.cmple(high).all() { 0.5 * (low + high) } else { self.lights.sky().center };
         let distance = match orbit.distance {
             Distance::Metres(length) => length,

@@ -4,7 +4,7 @@ use crate::error::{Error, ErrorKind};
 use crate::geometry::Mesh;
 use crate::light::{Pattern, SpotEdge};
 use crate::material::{Material, MediumParameters};
-use crate::math::{DAffine3, Rgb};
+use crate::math::{DAffine3, DVec3, Rgb, bounding_box_f64};
 use crate::texture::Texture;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -66,6 +66,14 @@ impl Description {
     /// open.
     pub fn blur(&self) -> Option<[f64; 2]> {
         self.shutter.filter(|_| self.animated)
+    }
+
+    /// World-space bounding box of all meshes, in f64. Without meshes, its lower corner is above the upper one.
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        bounding_box_f64(self.instances.iter().flat_map(|placed| {
+            let positions = self.meshes[placed.mesh as usize].positions.iter();
+            positions.map(|p| placed.to_world.transform_point3(p.as_dvec3()))
+        }))
     }
 }
 

@@ -2,11 +2,10 @@
 
 use super::Description;
 use super::description::{PlacedMesh, PunctualLight};
-use super::gltf::{MAX_COORDINATE, is_finite, is_invertible};
+use super::gltf::{check_reach, is_finite, is_invertible};
 use crate::error::{Error, ErrorKind, Result};
-use crate::geometry::Mesh;
 use crate::material::Material;
-use crate::math::{DAffine3, DVec3};
+use crate::math::{DAffine3, bounding_box};
 use std::collections::{HashMap, HashSet};
 
 impl Description {
@@ -32,7 +31,8 @@ impl Description {
             }
         }
         for &index in &placed {
-            check_reach(name, &self.meshes[self.instances[index].mesh as usize], &to_world)?;
+            let mesh = &self.meshes[self.instances[index].mesh as usize];
+            check_reach(bounding_box(mesh.positions.iter().copied()), &to_world, &format!("object \"{name}\""))?;
         }
         placed.into_iter().for_each(|index| self.instances[index].to_world = to_world);
         lights.into_iter().for_each(|index| self.lights[index].to_world = to_world);
@@ -118,17 +118,6 @@ fn places<'a>(instances: impl Iterator<Item = &'a PlacedMesh>) -> usize {
     instances.map(place).collect::<HashSet<_>>().len()
 }
 
-fn check_reach(name: &str, mesh: &Mesh, to_world: &DAffine3) -> Result<()> {
-    let points = || mesh.positions.iter().map(|p| p.as_dvec3());
-    let (low, high) = (points().fold(DVec3::INFINITY, DVec3::min), points().fold(DVec3::NEG_INFINITY, DVec3::max));
-    let corner = |i: usize| DVec3::select(glam::BVec3::new(i & 1 == 1, i & 2 == 2, i & 4 == 4), low, high);
-    let reach = |i: usize| to_world.transform_point3(corner(i)).abs().max_element();
-    match (0..8).all(|i| reach(i) <= MAX_COORDINATE) {
-        true => Ok(()),
-        false => Err(fault(name, "it reaches too far from the origin").hint("look at its scale and position")),
-    }
-}
-
 /// Replaces the items of a list by new ones of the same name, at the place of the first that is replaced. New names come
 /// last.
 fn replace<T>(list: &mut Vec<T>, new: Vec<T>, name: impl Fn(&T) -> &String) {
@@ -176,6 +165,8 @@ impl Kept {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Mesh;
+    use crate::math::DVec3;
     use crate::texture::{Texels, Texture, TextureRef, Wrap};
     use std::sync::Arc;
 

@@ -71,13 +71,7 @@ fn add_floor(description: &mut Description) {
         description.warnings.push("the studio has no floor, because the scene has motion blur".into());
         return;
     }
-    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for placed in &description.instances {
-        for p in &description.meshes[placed.mesh as usize].positions {
-            let p = placed.to_world.transform_point3(p.as_dvec3());
-            (low, high) = (low.min(p), high.max(p));
-        }
-    }
+    let (low, high) = description.bounds();
     if low.cmpgt(high).any() {
         return;
     }

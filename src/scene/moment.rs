@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::geometry::{Instance, Mesh, Shapes};
 use crate::light::{Emitter, Sky};
 use crate::material::{Material, Materials, MediumParameters, Scattering};
-use crate::math::Vec3;
+use crate::math::{Vec3, bounding_box, corners};
 use crate::trace::Tracer;
 use std::sync::Arc;
 
@@ -263,18 +263,12 @@ fn first_difference<'s>(
     }
 }
 
-/// The bounding box of points; without points, its lower corner is above the upper one.
-fn bounding_box(points: impl Iterator<Item = Vec3>) -> Box3 {
-    points.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))
-}
-
 /// A box in world space around the box of an instance's mesh.
-fn placed_box(instance: &Instance, (low, high): Box3) -> Box3 {
-    if low.cmpgt(high).any() {
-        return (low, high);
+fn placed_box(instance: &Instance, own: Box3) -> Box3 {
+    if own.0.cmpgt(own.1).any() {
+        return own;
     }
-    let corner = |i: u32| Vec3::select(glam::BVec3::new(i & 1 == 1, i & 2 == 2, i & 4 == 4), high, low);
-    bounding_box((0..8).map(|i| instance.point(corner(i))))
+    bounding_box(corners(own).map(|corner| instance.point(corner)))
 }
 
 /// The smallest box around boxes.

@@ -3,7 +3,7 @@
 use super::interior::Interior;
 use crate::camera::Camera;
 use crate::light::{Emitter, TriangleLight};
-use crate::math::Vec3;
+use crate::math::{Vec3, bounding_box};
 use crate::scene::Scene;
 use std::collections::HashMap;
 
@@ -68,8 +68,8 @@ struct Extent {
 
 impl Extent {
     fn of(points: impl IntoIterator<Item = Vec3>) -> Extent {
-        let nothing = Extent { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
-        points.into_iter().fold(nothing, |extent, p| Extent { low: extent.low.min(p), high: extent.high.max(p) })
+        let (low, high) = bounding_box(points);
+        Extent { low, high }
     }
 
     fn intersects(&self, other: &Extent) -> bool {

@@ -5,7 +5,7 @@ use super::super::{Effect, PlanRequest};
 use super::rays;
 use crate::camera::Camera;
 use crate::light::{Emitter, ShapedLight, TriangleLight};
-use crate::math::{Rgb, Vec3, luminance, one_minus_cos};
+use crate::math::{Rgb, Vec3, bounding_box, luminance, one_minus_cos};
 use crate::scene::Scene;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f32::consts::PI;
@@ -210,13 +210,7 @@ fn enclosure(scene: &Scene, mut rays: Vec<(Vec3, Vec3)>) -> Option<BTreeSet<u32>
 
 /// Whether the point `p` is in the common bounding box of objects, given by their indices.
 fn is_within(scene: &Scene, objects: &BTreeSet<u32>, p: Vec3) -> bool {
-    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for instance in scene.shapes.instances.iter().filter(|instance| objects.contains(&instance.object)) {
-        for &q in &scene.shapes.meshes[instance.mesh as usize].positions {
-            let q = instance.point(q);
-            (low, high) = (low.min(q), high.max(q));
-        }
-    }
+    let (low, high) = bounding_box(scene.shapes.points_of(|instance| objects.contains(&instance.object)));
     p.cmpge(low).all() && p.cmple(high).all()
 }
 

@@ -1,7 +1,7 @@
 //! Warns about objects before the near plane or behind the far plane of a camera (specification, section 3.10.3),
 //! because clip planes are not applied.
 
-use crate::math::{DAffine3, DVec3};
+use crate::math::{DAffine3, DVec3, Vec3, corners};
 use crate::scene::Description;
 use crate::scene::description::{CameraDescription, PictureDefaults, PlacedMesh, Projection};
 use smallvec::SmallVec;
@@ -32,7 +32,7 @@ pub(super) struct Clip {
 }
 
 /// Adds a warning for each camera with visible geometry before its near plane or behind its far plane.
-pub(super) fn check(out: &mut Description, clips: &[Clip], bounds: &[(DVec3, DVec3)]) {
+pub(super) fn check(out: &mut Description, clips: &[Clip], bounds: &[(Vec3, Vec3)]) {
     for (camera, clip) in out.cameras.iter().zip(clips) {
         let view = Frustum::new(camera, &out.picture);
         let shown = |range: DepthRange| {
@@ -88,7 +88,7 @@ impl Frustum {
         &self,
         out: &Description,
         placed: &PlacedMesh,
-        bounds: &[(DVec3, DVec3)],
+        bounds: &[(Vec3, Vec3)],
         range: &DepthRange,
         left: &mut usize,
     ) -> bool {
@@ -100,9 +100,8 @@ impl Frustum {
         let ends = [(DVec3::NEG_Z, -low), (DVec3::Z, high)];
         let planes = || self.sides.iter().chain(ends.iter().filter(|(_, offset)| offset.is_finite()));
         let outside = |points: &[DVec3]| planes().any(|&(n, offset)| points.iter().all(|&p| n.dot(p) + offset < 0.0));
-        let (lower, upper) = bounds[placed.mesh as usize];
-        let corner = |i: usize| DVec3::select(glam::BVec3::new(i & 1 == 1, i & 2 == 2, i & 4 == 4), lower, upper);
-        if outside(&std::array::from_fn::<_, 8, _>(|i| to_camera.transform_point3(corner(i)))) {
+        let corners = corners(bounds[placed.mesh as usize]);
+        if outside(&corners.map(|corner| to_camera.transform_point3(corner.as_dvec3()))) {
             return false;
         }
         let mesh = &out.meshes[placed.mesh as usize];

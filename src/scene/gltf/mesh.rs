@@ -11,7 +11,7 @@ use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
 /// Maximum absolute coordinate of a vertex (m). Squared areas of larger triangles would overflow f32.
-pub(in crate::scene) const MAX_COORDINATE: f64 = 1e9;
+pub(super) const MAX_COORDINATE: f64 = 1e9;
 
 /// Reads the primitive `primitive` of the mesh with index `index`, deformed by a node. `None` if it has nothing to
 /// render, with a warning.

@@ -36,9 +36,8 @@ mod transform;
 mod uri;
 
 pub use files::{files, hash};
-pub(super) use mesh::MAX_COORDINATE;
 pub use transform::affine;
-pub(super) use transform::{is_finite, is_invertible};
+pub(super) use transform::{check_reach, is_finite, is_invertible};
 
 use super::Description;
 use crate::error::{Error, ErrorKind, Result};

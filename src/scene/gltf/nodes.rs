@@ -7,17 +7,16 @@ use super::document::{Document, extension, get, named};
 use super::extras::{self, ObjectExtras, Rate, SceneExtras};
 use super::flat::flatten;
 use super::materials::{Library, tangent_coordinates};
-use super::mesh::MAX_COORDINATE;
 use super::shells;
 use super::topology::Solid;
-use super::transform::{WorldTransforms, compose, is_finite, is_invertible, local};
+use super::transform::{WorldTransforms, check_reach, compose, is_finite, is_invertible, local};
 use super::{
     Pose, ReadOptions, choice, compressed, counted, deform, fault, lights, mesh, profiles, shading_frame, topology, uri,
 };
 use crate::error::Result;
 use crate::geometry::Mesh;
 use crate::material::Material;
-use crate::math::{DAffine3, DMat3, DVec3, Rgb};
+use crate::math::{DAffine3, DMat3, Rgb, Vec3, bounding_box};
 use crate::memory;
 use crate::scene::Description;
 use crate::scene::description::{self, EnvironmentDescription, EnvironmentSource, PictureDefaults, PlacedMesh};
@@ -111,7 +110,7 @@ fn describe_pose(
 pub(super) struct Shared {
     library: Library,
     parts: HashMap<(usize, Option<usize>), Vec<Part>>,
-    bounds: Vec<(DVec3, DVec3)>,
+    bounds: Vec<(Vec3, Vec3)>,
     divisors: Option<lights::Divisors>,
     profiles: profiles::Profiles,
     /// Indices of the meshes in the file with inner shells of glass that were flipped.
@@ -213,7 +212,7 @@ struct Reader<'r> {
     meshes: HashMap<(usize, Option<usize>), Vec<Part>>,
     worlds: WorldTransforms<'r, 'r>,
     /// Bounding box, in local space, of each mesh in `out`.
-    bounds: Vec<(DVec3, DVec3)>,
+    bounds: Vec<(Vec3, Vec3)>,
     /// Clip planes of the cameras, in their order.
     clips: Vec<Clip>,
     /// Divisors from the file's units of punctual lights to radiometric units; `None` until the first light is read.
@@ -492,7 +491,7 @@ impl<'r> Reader<'r> {
             let to_world = to_world * copy;
             let invertible = is_invertible(&to_world);
             for &Part { mesh, material } in parts {
-                self.check_reach(mesh, &to_world, place)?;
+                check_reach(self.bounds[mesh as usize], &to_world, place)?;
                 let (mesh, to_world) = if invertible {
                     (mesh, to_world)
                 } else if let Some(mesh) = self.add_flattened(mesh, &to_world.matrix3, place)? {
@@ -533,19 +532,6 @@ impl<'r> Reader<'r> {
         self.bounds.push(self.bounds[mesh as usize]);
         self.out.meshes.push(Arc::new(flat));
         Ok(Some(self.out.meshes.len() as u32 - 1))
-    }
-
-    fn check_reach(&self, mesh: u32, to_world: &DAffine3, place: &str) -> Result<()> {
-        let (low, high) = self.bounds[mesh as usize];
-        let far = |i: usize| {
-            let corner = DVec3::select(glam::BVec3::new(i & 1 == 1, i & 2 == 2, i & 4 == 4), low, high);
-            let reach = to_world.transform_point3(corner).abs().max_element();
-            reach.is_nan() || reach > MAX_COORDINATE
-        };
-        if (0..8).any(far) {
-            return Err(fault(place, "it reaches too far from the origin").hint("look at its scale and position"));
-        }
-        Ok(())
     }
 
     /// The primitives of a mesh with their materials, read at the first call. `owner` is the node that deforms the
@@ -726,9 +712,8 @@ fn add_tangents(mesh: &mut Mesh, material: &Material) {
 }
 
 /// Bounding box of a mesh, in its own space.
-fn bounds(mesh: &Mesh) -> (DVec3, DVec3) {
-    let points = || mesh.positions.iter().map(|p| p.as_dvec3());
-    (points().fold(DVec3::INFINITY, DVec3::min), points().fold(DVec3::NEG_INFINITY, DVec3::max))
+fn bounds(mesh: &Mesh) -> (Vec3, Vec3) {
+    bounding_box(mesh.positions.iter().copied())
 }
 
 /// Flips inner shells (connected parts) of glass solids that face the wrong way, and adds warnings about flipped and

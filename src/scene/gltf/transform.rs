@@ -2,8 +2,9 @@
 
 use super::document::{Document, get, named};
 use super::fault;
+use super::mesh::MAX_COORDINATE;
 use crate::error::Result;
-use crate::math::{DAffine3, DMat3, DVec3};
+use crate::math::{DAffine3, DMat3, DVec3, Vec3, corners};
 use serde_json::Value;
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -51,6 +52,15 @@ pub(in crate::scene) fn is_invertible(transform: &DAffine3) -> bool {
     transform.matrix3.determinant() != 0.0
         && inverse.is_finite()
         && inverse.to_cols_array().iter().all(|x| x.abs() < f64::from(f32::MAX).sqrt())
+}
+
+/// Checks that a mesh with these bounds is not placed too far from the origin.
+pub(in crate::scene) fn check_reach(bounds: (Vec3, Vec3), to_world: &DAffine3, place: &str) -> Result<()> {
+    let reach = |corner: Vec3| to_world.transform_point3(corner.as_dvec3()).abs().max_element();
+    if corners(bounds).into_iter().all(|corner| reach(corner) <= MAX_COORDINATE) {
+        return Ok(());
+    }
+    Err(fault(place, "it reaches too far from the origin").hint("look at its scale and position"))
 }
 
 /// World transforms of the nodes of a document, in any of its scenes.
