@@ -24,6 +24,36 @@ fn is_perfect(roughness: f32) -> bool {
     roughness * roughness < DELTA_ALPHA
 }
 
+/// References to all textures of a material, by `as_ref` or `as_mut`.
+macro_rules! textures {
+    ($material:ident, $reference:ident) => {
+        [
+            $material.base_color_texture.$reference(),
+            $material.diffuse_roughness_texture.$reference(),
+            $material.metallic_roughness_texture.$reference(),
+            $material.normal_texture.$reference().map(|(texture, _)| texture),
+            $material.emission_texture.$reference(),
+            $material.transmission_texture.$reference(),
+            $material.diffuse_transmission_texture.$reference(),
+            $material.diffuse_transmission_color_texture.$reference(),
+            $material.specular_texture.$reference(),
+            $material.specular_color_texture.$reference(),
+            $material.iridescence_texture.$reference(),
+            $material.iridescence_thickness_texture.$reference(),
+            $material.clearcoat_texture.$reference(),
+            $material.clearcoat_roughness_texture.$reference(),
+            $material.clearcoat_ior_texture.$reference(),
+            $material.clearcoat_color_texture.$reference(),
+            $material.clearcoat_normal_texture.$reference().map(|(texture, _)| texture),
+            $material.sheen_color_texture.$reference(),
+            $material.sheen_roughness_texture.$reference(),
+            $material.anisotropy_texture.$reference(),
+        ]
+        .into_iter()
+        .flatten()
+    };
+}
+
 impl Material {
     /// Whether surfaces of this material emit light.
     pub fn emits(&self) -> bool {
@@ -109,58 +139,12 @@ impl Material {
 
     /// References to the textures that the material uses.
     pub fn textures(&self) -> impl Iterator<Item = TextureRef> {
-        [
-            self.base_color_texture,
-            self.diffuse_roughness_texture,
-            self.metallic_roughness_texture,
-            self.normal_texture.map(|(texture, _)| texture),
-            self.emission_texture,
-            self.transmission_texture,
-            self.diffuse_transmission_texture,
-            self.diffuse_transmission_color_texture,
-            self.specular_texture,
-            self.specular_color_texture,
-            self.iridescence_texture,
-            self.iridescence_thickness_texture,
-            self.clearcoat_texture,
-            self.clearcoat_roughness_texture,
-            self.clearcoat_ior_texture,
-            self.clearcoat_color_texture,
-            self.clearcoat_normal_texture.map(|(texture, _)| texture),
-            self.sheen_color_texture,
-            self.sheen_roughness_texture,
-            self.anisotropy_texture,
-        ]
-        .into_iter()
-        .flatten()
+        textures!(self, as_ref).copied()
     }
 
     /// The references to textures, to change them.
     pub fn textures_mut(&mut self) -> impl Iterator<Item = &mut TextureRef> {
-        [
-            self.base_color_texture.as_mut(),
-            self.diffuse_roughness_texture.as_mut(),
-            self.metallic_roughness_texture.as_mut(),
-            self.normal_texture.as_mut().map(|(texture, _)| texture),
-            self.emission_texture.as_mut(),
-            self.transmission_texture.as_mut(),
-            self.diffuse_transmission_texture.as_mut(),
-            self.diffuse_transmission_color_texture.as_mut(),
-            self.specular_texture.as_mut(),
-            self.specular_color_texture.as_mut(),
-            self.iridescence_texture.as_mut(),
-            self.iridescence_thickness_texture.as_mut(),
-            self.clearcoat_texture.as_mut(),
-            self.clearcoat_roughness_texture.as_mut(),
-            self.clearcoat_ior_texture.as_mut(),
-            self.clearcoat_color_texture.as_mut(),
-            self.clearcoat_normal_texture.as_mut().map(|(texture, _)| texture),
-            self.sheen_color_texture.as_mut(),
-            self.sheen_roughness_texture.as_mut(),
-            self.anisotropy_texture.as_mut(),
-        ]
-        .into_iter()
-        .flatten()
+        textures!(self, as_mut)
     }
 
     /// Whether the material fills a solid whose index of refraction depends on the wavelength.
