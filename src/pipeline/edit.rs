@@ -34,11 +34,7 @@ impl EditableScene {
     /// # Errors
     /// Errors of [`load::load`].
     pub fn load(request: SceneRequest, threads: usize, stop: &Stop) -> Result<EditableScene> {
-        load::check_memory(&request, threads)?;
-        let (description, file) = match usd::is_stage(&request.path) {
-            true => (usd::read(&request.path, &request.options, 0.0, stop)?, None),
-            false => gltf::MovingFile::open(&request.path, &request.options)?,
-        };
+        let (description, file) = load::read(&request, threads, stop)?;
         let loaded = Loaded { file, ..load::build(description.clone(), &request, threads)? };
         Ok(EditableScene { request, description, loaded, is_edited: false })
     }

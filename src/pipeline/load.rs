@@ -65,12 +65,24 @@ pub struct Loaded {
 /// The file, or a file that it names, is malformed; the request changes an environment that the scene does not have;
 /// `stop` is set.
 pub fn load(request: &SceneRequest, threads: usize, stop: &Stop) -> Result<Loaded> {
+    let (description, file) = read(request, threads, stop)?;
+    Ok(Loaded { file, ..build(description, request, threads)? })
+}
+
+/// Reads the description of a scene, and the file of its moments.
+///
+/// # Errors
+/// Errors of [`load`].
+pub(super) fn read(
+    request: &SceneRequest,
+    threads: usize,
+    stop: &Stop,
+) -> Result<(Description, Option<gltf::MovingFile>)> {
     check_memory(request, threads)?;
     if usd::is_stage(&request.path) {
-        return build(usd::read(&request.path, &request.options, 0.0, stop)?, request, threads);
+        return Ok((usd::read(&request.path, &request.options, 0.0, stop)?, None));
     }
-    let (description, file) = gltf::MovingFile::open(&request.path, &request.options)?;
-    Ok(Loaded { file, ..build(description, request, threads)? })
+    gltf::MovingFile::open(&request.path, &request.options)
 }
 
 /// Reads and builds the scene of a USD stage as it is `after_frame` frames after the frame of the request.
@@ -92,7 +104,7 @@ pub fn load_bytes(bytes: &[u8], request: &SceneRequest, threads: usize) -> Resul
     Ok(Loaded { file, ..build(description, request, threads)? })
 }
 
-pub(super) fn check_memory(request: &SceneRequest, threads: usize) -> Result<()> {
+fn check_memory(request: &SceneRequest, threads: usize) -> Result<()> {
     memory::require(EMBREE_BYTES + threads as u64 * EMBREE_BYTES_PER_THREAD, "Embree and its threads")
         .map_err(|e| e.within(request.path.display()).hint("give the program more memory, or fewer --threads"))
 }

@@ -105,7 +105,7 @@ impl Server {
         let built = &scene.loaded().scene;
         let cameras: Vec<&String> = built.cameras.iter().map(|camera| &camera.name).collect();
         let answer = json!({
-            "seconds": clock.seconds(), "triangles": triangles(&scene), "cameras": cameras, "warnings": built.warnings,
+            "seconds": clock.seconds(), "triangles": built.shapes.triangles(), "cameras": cameras, "warnings": built.warnings,
             "peak_memory": peak_memory(),
         });
         let options = json!(args.options.scene);
@@ -119,7 +119,7 @@ impl Server {
         let warnings = kept.scene.edit(edits, rayon::current_num_threads(), &self.inbox.stop())?;
         self.choice = None;
         let answer = json!({
-            "seconds": clock.seconds(), "triangles": triangles(&kept.scene), "warnings": warnings,
+            "seconds": clock.seconds(), "triangles": kept.scene.loaded().scene.shapes.triangles(), "warnings": warnings,
             "peak_memory": peak_memory(),
         });
         outbox::send("edited", id, answer, &[])
@@ -239,11 +239,6 @@ fn no_scene() -> Error {
 fn one_frame(options: &SceneOptions) -> Error {
     let first = options.frames.and_then(|frames| frames.iter().next()).unwrap_or(1);
     Error::usage("--frames: a scene is loaded at one frame").hint(format!("give one, such as --frames {first}"))
-}
-
-fn triangles(scene: &EditableScene) -> usize {
-    let shapes = &scene.loaded().scene.shapes;
-    shapes.instances.iter().map(|instance| shapes.meshes[instance.mesh as usize].triangles.len()).sum()
 }
 
 /// Opens the denoiser and the network that the options ask for, unless they are open.
