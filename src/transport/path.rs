@@ -19,7 +19,7 @@ use super::shares::{Incident, PathHalves, shares, wanted};
 use super::vertex::{MediumLight, MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::{PathStart, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
-use crate::light::Receiver;
+use crate::light::{Group, Receiver};
 use crate::math::{Rgb, Vec3, is_lit};
 use crate::medium::FlightDensity;
 use crate::plan::{ClassSet, LightPrefix, Part};
@@ -119,6 +119,21 @@ impl<R: PathRecorder> PathTracer<'_, R> {
         } += light;
     }
 
+    /// The history of the path where it meets a light on the way to the next vertex.
+    fn arriving(&self, scattered: Option<Scattered>) -> PathHistory {
+        let mut history = self.history;
+        if let Some(scattered) = scattered {
+            history.scattered(scattered.lobe);
+        }
+        history
+    }
+
+    /// [`PathTracer::add`] for a light of this group that the path meets on segment `depth`.
+    fn add_hit(&mut self, history: &PathHistory, (depth, group): (u32, Group), light: Rgb, weight: f32) {
+        let (class, first) = (history.suffix.class_at_light(false), self.first(|| FirstScatter::Emit));
+        self.add(Technique::Hit { camera: depth }, PathKind { class, group, first }, light, weight);
+    }
+
     /// Whether a vertex shows no light of its own because of shadow catchers: the path arrives at a catcher first, whose
     /// light is recorded apart, or at a light or another catcher from there, where it ends.
     #[cold]
@@ -196,18 +211,13 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
         if self.on_catcher {
             return;
         }
-        let mut history = self.history;
-        if let Some(scattered) = scattered {
-            history.scattered(scattered.lobe);
-        }
+        let history = self.arriving(scattered);
         if let Some((radiance, pdf)) =
             self.scene.lights.hit_radiance(&self.scene.materials, &self.last, &hit.surface, hit.wo)
         {
             let weight = Self::weight(scattered, pdf);
-            let light = hit.throughput * radiance * weight;
-            let (class, first) = (history.suffix.class_at_light(false), self.first(|| FirstScatter::Emit));
-            let of = PathKind { class, group: self.scene.lights.surface_group(&hit.surface), first };
-            self.add(Technique::Hit { camera: hit.depth }, of, light, weight);
+            let (light, group) = (hit.throughput * radiance * weight, self.scene.lights.surface_group(&hit.surface));
+            self.add_hit(&history, (hit.depth, group), light, weight);
         }
     }
 
@@ -216,24 +226,14 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
     }
 
     fn medium_light(&mut self, light: &MediumLight, scattered: Option<Scattered>) {
-        let mut history = self.history;
-        if let Some(scattered) = scattered {
-            history.scattered(scattered.lobe);
-        }
-        let (class, first) = (history.suffix.class_at_light(false), self.first(|| FirstScatter::Emit));
-        let of = PathKind { class, group: self.scene.lights.object_group(light.instance), first };
-        self.add(Technique::Hit { camera: light.depth }, of, light.light, 1.0);
+        let group = self.scene.lights.object_group(light.instance);
+        self.add_hit(&self.arriving(scattered), (light.depth, group), light.light, 1.0);
     }
 
     fn bulb(&mut self, hit: &BulbHit, scattered: Option<Scattered>) {
-        let mut history = self.history;
-        if let Some(scattered) = scattered {
-            history.scattered(scattered.lobe);
-        }
+        let history = self.arriving(scattered);
         if history.delta && !self.on_catcher {
-            let (class, first) = (history.suffix.class_at_light(false), self.first(|| FirstScatter::Emit));
-            let of = PathKind { class, group: hit.group, first };
-            self.add(Technique::Hit { camera: hit.depth }, of, hit.light, 1.0);
+            self.add_hit(&history, (hit.depth, hit.group), hit.light, 1.0);
         }
     }
 

@@ -226,17 +226,14 @@ impl<'a> Path<'a> {
         {
             MediumEmission { scene, visitor, throughput, draws, depth, scattered }.show(start, met);
         }
+        let segment = Segment { start: &start, end: &end, from_medium: self.in_medium, throughput, depth, scattered };
         if self.transport == Transport::Radiance && scene.pass_through_lights.is_some() {
-            let segment =
-                Segment { start: &start, end: &end, from_medium: self.in_medium, throughput, depth, scattered };
             visit_pass_through_lights(scene, &segment, visitor);
         }
         if self.transport == Transport::Radiance
             && scene.lights.has_bulbs()
             && scattered.is_none_or(|scattered| scattered.lobe == LobeSet::DELTA)
         {
-            let segment =
-                Segment { start: &start, end: &end, from_medium: self.in_medium, throughput, depth, scattered };
             visit_bulbs(scene, &segment, visitor);
         }
         if BESIDES >= SCATTERING
