@@ -10,13 +10,14 @@ use crate::support;
 use caustique::estimator::InitialBandwidth;
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
-use caustique::render::{Control, Counts, Levels, Method, Rendered, Settings, Shard};
+use caustique::render::{Counts, Levels, Method, Rendered, Settings, Shard};
 use caustique::scene::description::{
     EnvironmentDescription, EnvironmentSource, Projection, PunctualKind, PunctualLight,
 };
 use caustique::scene::{Description, Scene};
+use support::render;
 use support::scenes::{
-    add, build, cuboid, glass, glossy_balls, lit_room, look_at, matte, mirror, point_light, quad, sphere, square,
+    add, build, cuboid, glass, glossy_balls, lit_room, look_at, matte, mirror, point_light, quad, sphere,
 };
 use support::stats::{Check, ERROR_RATE, t_critical};
 use support::tiles::{SIZE, TILES, average};
@@ -24,14 +25,6 @@ use support::tiles::{SIZE, TILES, average};
 /// The methods that use multiple importance sampling.
 fn all() -> Vec<Method> {
     Method::ALL.iter().copied().filter(|method| method.has_techniques()).collect()
-}
-
-fn render(scene: &Scene, method: Method, size: u32, settings: &Settings) -> Rendered {
-    let camera = scene.camera(&square(size)).expect("a camera");
-    let settings = Settings { method, ..settings.clone() };
-    let rendered = caustique::render::render(scene, &camera, &settings, |_, _| Control::Continue);
-    assert_eq!(rendered.rejected(), 0, "{method:?}");
-    rendered
 }
 
 fn settings(iterations: u64, radius: f32, seed: u64) -> Settings {

@@ -13,7 +13,7 @@ use caustique::geometry::Mesh;
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
 use caustique::random::{Domain, Purpose, Stream};
-use caustique::render::{Control, Levels, Method, Rendered, Settings};
+use caustique::render::{Levels, Method, Rendered, Settings};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
 use caustique::scene::{Description, Scene};
 use caustique::spectrum::{BANDS, Band, IterationWavelengths, Wavelength, WavelengthSample, observer};
@@ -22,7 +22,8 @@ use caustique::transport::{
 };
 use glam::DQuat;
 use support::channels::{self, SIZE, agree, disagreeing};
-use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, sphere, square};
+use support::render;
+use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, sphere};
 use support::stats::{ERROR_RATE, chi_squared_p, mean_and_error, sidak, t_critical};
 
 /// Glass of this index of refraction at 587.6 nm and this Abbe number.
@@ -425,14 +426,6 @@ fn settings(iterations: u64, seed: u64) -> Settings {
 
 fn photons(photons: u32, radius: f32, iterations: u64, seed: u64) -> Settings {
     Settings { photons, initial_bandwidth: InitialBandwidth::Fixed(radius), ..settings(iterations, seed) }
-}
-
-fn render(scene: &Scene, method: Method, size: u32, settings: &Settings) -> Rendered {
-    let camera = scene.camera(&square(size)).expect("a camera");
-    let settings = Settings { method, ..settings.clone() };
-    let rendered = caustique::render::render(scene, &camera, &settings, |_, _| Control::Continue);
-    assert_eq!(rendered.rejected(), 0, "{method:?}");
-    rendered
 }
 
 const SEEDS: u64 = 10;

@@ -11,10 +11,11 @@ use caustique::material::{Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec2, Vec3};
 use caustique::medium::HenyeyGreenstein;
 use caustique::random::{Domain, Purpose, Stream};
-use caustique::render::{Control, KernelChoice, Levels, Method, Rendered, Settings};
+use caustique::render::{KernelChoice, Levels, Method, Settings};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
 use support::channels::{self, SIZE, agree};
+use support::render;
 use support::scenes::{add, build, cuboid, glass, look_at, matte, point_light, quad, sphere, square};
 use support::stats::{Check, ERROR_RATE, chi_squared_p, sidak};
 
@@ -147,14 +148,6 @@ fn settings(iterations: u64, seed: u64) -> Settings {
 fn photons(photons: u32, radius: f32, iterations: u64, seed: u64) -> Settings {
     let initial = InitialBandwidth::Fixed(radius);
     Settings { photons, initial_bandwidth: initial, levels: Levels::new(5), ..settings(iterations, seed) }
-}
-
-fn render(scene: &Scene, method: Method, size: u32, settings: &Settings) -> Rendered {
-    let camera = scene.camera(&square(size)).expect("a camera");
-    let settings = Settings { method, ..settings.clone() };
-    let rendered = caustique::render::render(scene, &camera, &settings, |_, _| Control::Continue);
-    assert_eq!(rendered.rejected(), 0, "{method:?}");
-    rendered
 }
 
 /// Mean over the picture of every channel, one per seed.

@@ -11,12 +11,13 @@ use caustique::material::{Material, MediumGrids, MediumParameters};
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
 use caustique::medium::{DensityGrid, EmissionGrid, Grid};
 use caustique::random::HashSequence;
-use caustique::render::{Control, Levels, Method, Rendered, Settings};
+use caustique::render::{Levels, Method, Rendered, Settings};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
 use std::sync::Arc;
 use support::channels::{self, SIZE, agree};
-use support::scenes::{add, add_at, build, cuboid, glass, look_at, matte, quad, square};
+use support::render;
+use support::scenes::{add, add_at, build, cuboid, glass, look_at, matte, quad};
 use support::stats::Check;
 
 /// A density grid over the box from -1 to 1 of `cells` per edge, whose value at a cell's centre is `value`.
@@ -65,14 +66,6 @@ fn settings(iterations: u64, seed: u64) -> Settings {
 fn photons(photons: u32, radius: f32, iterations: u64, seed: u64) -> Settings {
     let initial_bandwidth = InitialBandwidth::Fixed(radius);
     Settings { photons, initial_bandwidth, levels: Levels::new(5), ..settings(iterations, seed) }
-}
-
-fn render(scene: &Scene, method: Method, size: u32, settings: &Settings) -> Rendered {
-    let camera = scene.camera(&square(size)).expect("a camera");
-    let settings = Settings { method, ..settings.clone() };
-    let rendered = caustique::render::render(scene, &camera, &settings, |_, _| Control::Continue);
-    assert_eq!(rendered.rejected(), 0, "{method:?}");
-    rendered
 }
 
 fn seeds(scene: &Scene, method: Method, seeds: u64, of: impl Fn(u64) -> Settings) -> Vec<Vec<f64>> {
@@ -138,18 +131,24 @@ fn furnace_of_smoke() {
     }
 }
 
-/// A room with a lamp, and a medium in a box that is smaller than the room.
-fn room(medium: MediumParameters, density: Option<DensityGrid>) -> Scene {
+/// The walls of a room, and a camera in it.
+fn walls() -> Description {
     let mut description = Description::default();
     let room = cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 2.0), true);
     add(&mut description, "room", room, matte(0.5, 0.0));
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 1.9), DVec3::new(0.0, 0.8, 0.0), 55.0));
+    description
+}
+
+/// A room with a lamp, and a medium in a box that is smaller than the room.
+fn room(medium: MediumParameters, density: Option<DensityGrid>) -> Scene {
+    let mut description = walls();
     let lamp = quad(Vec3::new(-0.4, 1.98, -0.4), Vec3::X * 0.8, Vec3::Z * 0.8);
     add(&mut description, "lamp", lamp, matte(0.0, 8.0));
     let to_world = DAffine3::from_translation(DVec3::new(0.1, 0.8, 0.1))
         * DAffine3::from_rotation_y(0.3)
         * DAffine3::from_scale(DVec3::new(0.6, 0.7, 0.5));
     add_at(&mut description, "smoke", domain(), holds(medium, density), to_world);
-    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 1.9), DVec3::new(0.0, 0.8, 0.0), 55.0));
     build(description)
 }
 
@@ -212,15 +211,12 @@ fn fire_in_equilibrium_is_invisible() {
 /// All methods find the same light of a fire that lights a room, seen directly and by a mirror.
 #[test]
 fn methods_agree_by_firelight() {
-    let mut description = Description::default();
-    let room = cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 2.0), true);
-    add(&mut description, "room", room, matte(0.5, 0.0));
+    let mut description = walls();
     let mirror = quad(Vec3::new(-0.95, 0.3, -0.9), Vec3::Y * 1.4, Vec3::new(0.5, 0.0, -0.05));
     add(&mut description, "mirror", mirror, support::scenes::mirror());
     let to_world = DAffine3::from_translation(DVec3::new(0.2, 0.6, 0.1)) * DAffine3::from_scale(DVec3::splat(0.3));
     let medium = coefficients([1.0, 2.0, 4.0], [0.5; 3], 0.3);
     add_at(&mut description, "fire", domain(), burns(medium, puffs(3), [20.0, 8.0, 1.0]), to_world);
-    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 1.9), DVec3::new(0.0, 0.8, 0.0), 55.0));
     let scene = build(description);
     let path = seeds(&scene, Method::Path, 10, |seed| settings(60, seed));
     let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(30, seed));

@@ -15,18 +15,27 @@ from cycles_comparison import eye, glow, lamp, shared, square
 from mathutils import Vector
 
 
+def background(world):
+    """The Background node of a world."""
+    return next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
+
+
 class Lamps(cycles_comparison.CyclesComparison):
+    def world(self, color=None):
+        """Gives the scene a new world with a background of this colour."""
+        world = self.scene.world = bpy.data.worlds.new("world")
+        if bpy.app.version < (5, 0, 0):
+            world.use_nodes = True
+        if color is not None:
+            background(world).inputs["Color"].default_value = color
+        return world
+
     def test_area_lamps_hide_and_let_light_through(self):
         """A camera above an area lamp sees the floor below it, which a sky lights through the lamp; so does one
         below."""
         self.floor()
         lamp("AREA", (0, 0, 1), 20, size=2.0)
-        world = bpy.data.worlds.new("world")
-        if bpy.app.version < (5, 0, 0):
-            world.use_nodes = True
-        background = next(n for n in world.node_tree.nodes if n.type == "BACKGROUND")
-        background.inputs["Color"].default_value = (1, 0.5, 0.2, 1)
-        self.scene.world = world
+        self.world((1, 0.5, 0.2, 1))
         for at in ((0.3, 0.2, 3), (0.4, 2.0, 0.5)):
             eye(at, (0, 0, 0), lens=40)
             theirs = self.cycles()
@@ -44,11 +53,7 @@ class Lamps(cycles_comparison.CyclesComparison):
         lamp("SPOT", (-1, 0, 1), 20).lightgroup = "gone"
         panel = shared.place("panel", square(glow("glowing", (1, 1, 1)), 0.2), (0, 1, 0.5))
         panel.lightgroup = "Sky light"
-        world = bpy.data.worlds.new("world")
-        world.lightgroup = "Sky light"
-        if bpy.app.version < (5, 0, 0):
-            world.use_nodes = True
-        self.scene.world = world
+        self.world().lightgroup = "Sky light"
         self.caustique(4, "--method", "path", "--layers", "beauty,LightGroup_key,LightGroup_Sky_light")
         document, _ = glb.read(self.path)
         said = {node["name"]: node.get("extras", {}).get("caustique", {}) for node in document["nodes"]}
@@ -255,11 +260,7 @@ class Lamps(cycles_comparison.CyclesComparison):
 
     def test_bulbs_let_light_through(self):
         """The bulb of a point lamp is seen directly and in a mirror, in front of the world, and casts no shadow."""
-        world = bpy.data.worlds.new("world")
-        if bpy.app.version < (5, 0, 0):
-            world.use_nodes = True
-        self.scene.world = world
-        next(n for n in world.node_tree.nodes if n.type == "BACKGROUND").inputs["Color"].default_value = (1, 1, 1, 1)
+        self.world((1, 1, 1, 1))
         floor = self.floor(3)
         body = lamp("POINT", (0, 0, 0.6), 5.0, shadow_soft_size=0.4, use_soft_falloff=False)
         eye((0, -0.1, 0.1), (0, 0, 0), lens=80)
@@ -273,11 +274,7 @@ class Lamps(cycles_comparison.CyclesComparison):
         self.alike(self.caustique(), self.cycles(), tolerance=0.03)
 
     def test_bulbs_of_spots_are_seen_in_mirrors_and_block_no_light(self):
-        world = bpy.data.worlds.new("world")
-        if bpy.app.version < (5, 0, 0):
-            world.use_nodes = True
-        self.scene.world = world
-        next(n for n in world.node_tree.nodes if n.type == "BACKGROUND").inputs["Color"].default_value = (1, 1, 1, 1)
+        self.world((1, 1, 1, 1))
         floor = self.floor(3)
         body = lamp("SPOT", (0, 0, 0.6), 5.0, shadow_soft_size=0.2, spot_size=2.6, spot_blend=0.1, use_soft_falloff=False)
         eye((0, -0.1, 0.1), (0, 0, 0), lens=80)
@@ -317,18 +314,14 @@ class Lamps(cycles_comparison.CyclesComparison):
 
     def test_a_sun_in_the_sky_is_a_lamp(self):
         self.floor()
-        world = bpy.data.worlds.new("world")
-        if bpy.app.version < (5, 0, 0):
-            world.use_nodes = True
+        world = self.world()
         tree = world.node_tree
         sky = tree.nodes.new("ShaderNodeTexSky")
         if bpy.app.version < (5, 0, 0):
             sky.sky_type = "NISHITA"
         sky.sun_elevation, sky.sun_rotation, sky.sun_size = 0.6, 2.0, math.radians(2)
-        background = next(n for n in tree.nodes if n.type == "BACKGROUND")
-        background.inputs["Strength"].default_value = 0.3
-        tree.links.new(sky.outputs[0], background.inputs["Color"])
-        self.scene.world = world
+        background(world).inputs["Strength"].default_value = 0.3
+        tree.links.new(sky.outputs[0], background(world).inputs["Color"])
         shared.place("post", square(bpy.data.materials["grey"], 0.3), (0, 0, 0.5))
         eye((0, -3, 3), (0, 0, 0), lens=45)
         theirs = self.cycles()
@@ -341,12 +334,7 @@ class Lamps(cycles_comparison.CyclesComparison):
     def test_a_world_hidden_from_cameras(self):
         """The world lights the floor, and cameras see black. Other hidden rays are named losses."""
         self.floor(1.0)
-        world = bpy.data.worlds.new("world")
-        if bpy.app.version < (5, 0, 0):
-            world.use_nodes = True
-        background = next(n for n in world.node_tree.nodes if n.type == "BACKGROUND")
-        background.inputs["Color"].default_value = (1, 0.5, 0.2, 1)
-        self.scene.world = world
+        world = self.world((1, 0.5, 0.2, 1))
         world.cycles_visibility.camera = False
         eye((0, -3, 3), (0, 0, 0), lens=45)
         self.alike(self.caustique(), self.cycles())
@@ -355,7 +343,7 @@ class Lamps(cycles_comparison.CyclesComparison):
         self.assertIn("hidden from glossy rays", export.write(self.path)[0])
         paths, mix = (world.node_tree.nodes.new("ShaderNode" + kind) for kind in ("LightPath", "MixShader"))
         output = next(n for n in world.node_tree.nodes if n.type == "OUTPUT_WORLD")
-        for socket, end in ((paths.outputs["Is Camera Ray"], mix.inputs[0]), (background.outputs[0], mix.inputs[2]),
+        for socket, end in ((paths.outputs["Is Camera Ray"], mix.inputs[0]), (background(world).outputs[0], mix.inputs[2]),
                             (mix.outputs[0], output.inputs["Surface"])):
             world.node_tree.links.new(socket, end)
         self.assertIn("Light Path node", "\n".join(export.write(self.path)))
