@@ -2,6 +2,7 @@
 
 use super::deform::Deformation;
 use super::document::{Document, get, named};
+use super::transform::MAX_COORDINATE;
 use super::{container, counted, fault, shading_frame};
 use crate::error::Result;
 use crate::geometry::Mesh;
@@ -9,9 +10,6 @@ use crate::math::{Vec2, Vec3, Vec4};
 use gltf::json;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
-
-/// Maximum absolute coordinate of a vertex (m). Squared areas of larger triangles would overflow f32.
-pub(super) const MAX_COORDINATE: f64 = 1e9;
 
 /// Reads the primitive `primitive` of the mesh with index `index`, deformed by a node. `None` if it has nothing to
 /// render, with a warning.

@@ -2,12 +2,14 @@
 
 use super::document::{Document, get, named};
 use super::fault;
-use super::mesh::MAX_COORDINATE;
 use crate::error::Result;
 use crate::math::{DAffine3, DMat3, DVec3, Vec3, corners};
 use serde_json::Value;
 use std::cell::RefCell;
 use std::collections::HashMap;
+
+/// Maximum absolute coordinate of a vertex (m). Squared areas of larger triangles would overflow f32.
+pub(super) const MAX_COORDINATE: f64 = 1e9;
 
 /// Transform of a node relative to its parent, from a matrix, or from translation, rotation and scale (specification,
 /// section 3.5.3), read from the raw JSON in f64.
