@@ -2,8 +2,9 @@
 
 Rows: `sppm` with one level; the networks of scripts/lab.sh training that have a checkpoint, on `sppm` with five levels
 and two camera paths, or one; the deep combiner, whose budget is half `bdpt` and half `sppm`; path tracing denoised by
-OIDN; and the default finish of `sppm`. The networks' own time is not in the budget; the last column has it in
-core-seconds, with the start of PyTorch. out/combiner/ has a page of pictures for each scene and budget.
+OIDN; and the default finish of `sppm`. The time of networks, denoiser and finish is not in the budget; the last column
+has that of the networks in core-seconds, with the start of PyTorch. out/combiner/ has a page of pictures for each scene
+and budget, with maps of the networks' weights.
 """
 
 from pathlib import Path
@@ -22,7 +23,8 @@ from .training import FOLDER, RUNS
 # A glossy interior, a pool, a room with glass, and a caustic of water.
 ARGUMENTS = references.ARGUMENTS | {
     "scenes": ["interior", "pool", "second/dining", "second/bath"],
-    "budgets": [10.0, 40.0, 160.0],
+    "budgets": [4.0, 16.0, 64.0],
+    "reference_seconds": 120.0,
     "seeds": 3,
     "threads": 1,
     "clock": "cpu",
@@ -73,9 +75,13 @@ class Made(NamedTuple):
     seconds: float = 0.0
 
 
-def plain(scene, budget, seed):
-    folder = render(scene, "sppm", "none", budget, seed, "--levels", "1")
-    return Made(Layers(folder / "picture.exr").get("Noisy"))
+def plain(layer):
+    """A function that renders one level and returns a layer: the estimate, or the finished picture."""
+
+    def make(scene, budget, seed):
+        return Made(Layers(render(scene, "sppm", "", budget, seed, "--levels", "1") / "picture.exr").get(layer))
+
+    return make
 
 
 def network(run, names):
@@ -102,15 +108,11 @@ def denoised_path(scene, budget, seed):
     return Made(picture)
 
 
-def finished(scene, budget, seed):
-    return Made(Layers(render(scene, "sppm", "", budget, seed, "--levels", "1") / "picture.exr").get(""))
-
-
 def rows(names):
     """The rows of the table: functions of scene, budget and seed."""
     trained = [run for run in options.runs if (options.folder / "runs" / run / "last.pt").exists()]
-    found = {"sppm": plain, **{run: network(run, names) for run in trained}}
-    return found | {"path, OIDN": denoised_path, "sppm, finished": finished}
+    found = {"sppm": plain("Noisy"), **{run: network(run, names) for run in trained}}
+    return found | {"path, OIDN": denoised_path, "sppm, finished": plain("")}
 
 
 def measure(scene, budget, reference, names):
@@ -124,6 +126,7 @@ def measure(scene, budget, reference, names):
             continue
         errors, last[name] = [reference.measure(one.picture) for one in made], made[-1]
         found[name] = {key: sum(one[key] for one in errors) / len(errors) for key in KEYS}
+        found[name]["network_core_seconds"] = sum(one.seconds for one in made) / len(made)
         ratio = found[name]["relmse_trimmed"] / found["sppm"]["relmse_trimmed"]
         values = "".join(f"{found[name][key]:>11.4g}" for key in KEYS)
         print(f"    {name:<16}{values}{ratio:>10.3f}{last[name].seconds:>9.1f}", flush=True)
@@ -141,11 +144,10 @@ def draw(scene, budget, last, reference):
     print(f"    {file}")
 
 
-def geometric_means(cells):
-    """The geometric mean over the cells of each row's trimmed relMSE relative to `sppm`."""
-    error = lambda cell, name: cell["rows"][name]["relmse_trimmed"] / cell["rows"]["sppm"]["relmse_trimmed"]
-    names = {name: None for cell in cells for name in cell["rows"]}
-    return {name: geometric([max(error(cell, name), 1e-6) for cell in cells if name in cell["rows"]]) for name in names}
+def relative(cells, name, key="relmse_trimmed"):
+    """The geometric mean over the cells that have a row of its error relative to `sppm`."""
+    found = [cell["rows"] for cell in cells if name in cell["rows"]]
+    return geometric([max(rows[name][key], 1e-6) / max(rows["sppm"][key], 1e-6) for rows in found])
 
 
 def main():
@@ -159,10 +161,9 @@ def main():
             print(f"{'':<20}{'relMSE':>11}{'trimmed':>11}{'FLIP':>11}{'to sppm':>10}{'network':>9}", flush=True)
             found, last = measure(scene, budget, reference, known)
             draw(scene, budget, last, reference)
-            cells.append({"scene": name, "budget": budget, "rows": found})
-    means = geometric_means(cells)
+            cells.append({"scene": name, "budget": budget, "paper": PAPER.get(name), "rows": found})
     print("\ngeometric means of the trimmed relMSE relative to sppm")
-    for name, mean in means.items():
-        print(f"    {name:<16}{mean:>10.3f}")
+    for name in {name: None for cell in cells for name in cell["rows"]}:
+        print(f"    {name:<16}{relative(cells, name):>10.3f}")
     settings = {"program": program(), **{key: getattr(options, key) for key in ("width", "threads", "seeds")}}
-    record("combiner", {**settings, "geometric_means": means, "cells": cells})
+    record("combiner", {**settings, "cells": cells})

@@ -1,4 +1,4 @@
-"""Trains the networks of the combiner in turns, at the lowest priority, and prints their errors on held-out views. A
+"""Trains the networks of the combiner in turns, at the lowest priority, and stores their errors on held-out views. A
 repeated run continues where the last one stopped, also on another machine. On a machine with a GPU and many cores,
 --together trains all at once, and --seconds ends their schedules after a time.
 
@@ -17,6 +17,7 @@ from pathlib import Path
 
 from ..cache import installed
 from ..options import names, options
+from ..record import record
 from ..train import views
 from .training_data import FOLDER
 
@@ -98,4 +99,7 @@ def main():
             failed |= {run for run, process in started.items() if process.wait() != 0}
     for run in options.runs:
         print(f"{run:14}{'failed; ' if run in failed else ''}{json.dumps(last_line(run))}")
+    lines = {run: last_line(run) for run in options.runs if last_line(run)}
+    stacks = {held_out: len({item[0] for item in views.files(options.folder, held_out)}) for held_out in (False, True)}
+    record("training", {"views": stacks[False], "held_out_views": stacks[True], "runs": lines})
     return 1 if failed else 0
