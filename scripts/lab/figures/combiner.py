@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from .. import references, renders
-from ..accuracy import geometric
 from ..combiner_page import page
 from ..cache import Failed, create, digest, installed, load, program, run_timed, save
 from ..options import names, options
 from ..picture_errors import Layers, Reference
 from ..record import ROOT, record
+from ..tables.combiner_tables import relative
 from ..train import data
 from .training import FOLDER, RUNS
 
@@ -142,12 +142,6 @@ def draw(scene, budget, last, reference):
     file = ROOT / "out" / "combiner" / f"{references.name(scene).replace('/', '-')}-{budget:g}.png"
     page(file, {name: made.picture for name, made in last.items()}, shares, reference.mean)
     print(f"    {file}")
-
-
-def relative(cells, name, key="relmse_trimmed"):
-    """The geometric mean over the cells that have a row of its error relative to `sppm`."""
-    found = [cell["rows"] for cell in cells if name in cell["rows"]]
-    return geometric([max(rows[name][key], 1e-6) / max(rows["sppm"][key], 1e-6) for rows in found])
 
 
 def main():
