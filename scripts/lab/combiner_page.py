@@ -15,7 +15,7 @@ def display(picture, exposure):
 
 
 def page(path, pictures, shares, reference):
-    """Writes a PNG: the pictures by name and the reference, then the shares [h, w] by name in grey."""
+    """Writes a sheet: the pictures by name and the reference, then the shares [h, w] by name in grey."""
     # The 95th percentile of the reference is as bright as white.
     exposure = 1 / max(np.percentile(reference, 95), 1e-9)
     tiles = [(name, display(picture, exposure)) for name, picture in {**pictures, "reference": reference}.items()]
@@ -29,4 +29,4 @@ def page(path, pictures, shares, reference):
         draw.text((x + 2, y + 1), name, fill="black")
         sheet.paste(tile, (x, y + TITLE))
     path.parent.mkdir(parents=True, exist_ok=True)
-    sheet.save(path)
+    sheet.save(path, quality=80, optimize=True)

@@ -4,7 +4,7 @@ Rows: `sppm` with one level; the networks of scripts/lab.sh training that have a
 and two camera paths, or one; the deep combiner, whose budget is half `bdpt` and half `sppm`; path tracing denoised by
 OIDN; and the default finish of `sppm`. The time of networks, denoiser and finish is not in the budget; the last column
 has that of the networks in core-seconds, with the start of PyTorch. out/combiner/ has a page of pictures for each scene
-and budget, with maps of the networks' weights.
+and budget, with maps of the networks' weights; docs/lab/combiner/ has those of the largest budget.
 """
 
 from pathlib import Path
@@ -23,7 +23,7 @@ from .training import FOLDER, RUNS
 # A glossy interior, a pool, a room with glass, and a caustic of water.
 ARGUMENTS = references.ARGUMENTS | {
     "scenes": ["interior", "pool", "second/dining", "second/bath"],
-    "budgets": [4.0, 16.0, 64.0],
+    "budgets": [4.0, 12.0, 36.0],
     "reference_seconds": 120.0,
     "seeds": 3,
     "threads": 1,
@@ -135,11 +135,14 @@ def measure(scene, budget, reference, names):
 
 def draw(scene, budget, last, reference):
     """Writes the page of a scene: pictures, and the first and last shares of each network's weights."""
+    name = references.name(scene).replace("/", "-")
     shares = {}
     for name, made in last.items():
         numbers = sorted(made.shares, key=lambda share: int(share.removeprefix("Share")))
         shares |= {f"{name} {number}": made.shares[number] for number in dict.fromkeys(numbers[:1] + numbers[-1:])}
-    file = ROOT / "out" / "combiner" / f"{references.name(scene).replace('/', '-')}-{budget:g}.png"
+    file = ROOT / "out" / "combiner" / f"{name}-{budget:g}.png"
+    if budget == max(options.budgets):
+        file = ROOT / "docs" / "lab" / "combiner" / f"{name}.jpg"
     page(file, {name: made.picture for name, made in last.items()}, shares, reference.mean)
     print(f"    {file}")
 
