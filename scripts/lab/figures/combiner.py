@@ -23,7 +23,7 @@ from .training import FOLDER, RUNS
 # A glossy interior, a pool, a room with glass, and a caustic of water.
 ARGUMENTS = references.ARGUMENTS | {
     "scenes": ["interior", "pool", "second/dining", "second/bath"],
-    "budgets": [4.0, 12.0, 36.0],
+    "budgets": [3.0, 8.0, 20.0],
     "reference_seconds": 120.0,
     "seeds": 3,
     "threads": 1,
