@@ -80,15 +80,9 @@ pub(super) fn renders_catchers(settings: &Settings, scene: &Scene) -> bool {
     !scene.survey.catchers || settings.method.search() == Search::CameraPaths
 }
 
-/// Rejects settings whose method stores photons on surfaces only, if the scene has scattering media, and Markov chains,
-/// if the density of a medium varies.
+/// Rejects settings whose method stores photons on surfaces only, if the scene has scattering media.
 fn check_media(settings: &Settings, path: &Path, scene: &Scene) -> Result<()> {
     let method = settings.method;
-    if scene.survey.grids && method.has_chains() {
-        let cause = format!("--method {} does not render media whose density varies", method.name());
-        let error = Error::new(ErrorKind::Usage, path.display(), cause);
-        return Err(error.hint("choose --method path, light, bdpt, vcm, sppm or cppm"));
-    }
     let (option, hint) = match method.search() {
         _ if !scene.survey.scattering => return Ok(()),
         Search::Map | Search::Merging => {

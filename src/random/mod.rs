@@ -302,11 +302,15 @@ impl Draws {
     /// 64 random bits for `purpose`.
     #[inline]
     pub fn bits(self, purpose: Purpose) -> u64 {
+        let hash = self.hash(purpose);
         if self.generator == Generator::Chain {
             let u = self.chained(purpose);
-            return mix(u64::from(u.x.to_bits()) << 32 | u64::from(u.y.to_bits()));
+            // The initial state of a chain is the ordinary path, with the bits of its decisions.
+            if u != square(hash) {
+                return mix(u64::from(u.x.to_bits()) << 32 | u64::from(u.y.to_bits()));
+            }
         }
-        self.hash(purpose)
+        hash
     }
 
     #[inline]
@@ -509,6 +513,23 @@ mod tests {
         let mut chain = Chain::new(5);
         chain.set_initial(draws.id(Purpose::Roulette), Vec2::new(0.625, 0.5));
         assert_eq!(chain.run(|| draws.one_if(false, Purpose::Roulette)), 0.625);
+    }
+
+    /// The first path of a Markov chain draws the bits and numbers of the ordinary path; a mutated path draws others.
+    #[test]
+    fn chains_start_at_the_bits_of_the_ordinary_path() {
+        for i in 0..1000 {
+            let stream = Streams::new(3, 1, Domain::Test).path(i);
+            let [ordinary, chained] = [stream, stream.chained()].map(|stream| stream.vertex(1).nth(2));
+            let of = |draws: Draws| (draws.bits(Purpose::Alpha), draws.token(Purpose::Alpha), draws.two(Purpose::Lobe));
+            let mut chain = Chain::new(i);
+            assert_eq!(chain.run(|| of(chained)), of(ordinary));
+            chain.propose();
+            let mutated = chain.run(|| of(chained));
+            assert!(mutated.0 != of(ordinary).0 && mutated.1 != of(ordinary).1, "path {i}");
+            chain.accept_or_reject(0.0);
+            assert_eq!(chain.run(|| of(chained)), of(ordinary));
+        }
     }
 
     /// Iteration 0 and iterations beyond the 2^32 points of a sequence have their own draws.

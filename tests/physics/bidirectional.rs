@@ -8,7 +8,7 @@
 use crate::support;
 
 use caustique::estimator::InitialBandwidth;
-use caustique::material::{Material, MediumParameters};
+use caustique::material::{Alpha, Material, MediumParameters};
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
 use caustique::render::{Counts, Levels, Method, Rendered, Settings, Shard};
 use caustique::scene::description::{
@@ -258,6 +258,19 @@ fn agree_with(
         let noticed = !disagreeing(&wrong, reference, tests, bias).is_empty();
         assert!(noticed, "{what}, {:?}: a tile brighter by {planted} is not detected", method.0);
     }
+}
+
+/// Markov chains start at paths with their cut-outs: none of them starts in the dark.
+#[test]
+fn chains_behind_cut_outs() {
+    let mut description = lit_room(matte(0.5, 0.0));
+    let curtain =
+        Material { alpha: Alpha::Blend, base_color: [0.2, 0.2, 0.2, 0.5], double_sided: true, ..matte(0.2, 0.0) };
+    for (name, z) in [("near", 1.6), ("far", 0.8)] {
+        let sheet = quad(Vec3::new(-1.0, 0.0, z), Vec3::X * 2.0, Vec3::Y * 2.0);
+        add(&mut description, name, sheet, curtain.clone());
+    }
+    agree("cut-outs", &build(description), &[(Method::Bdpt, 12), (Method::Mlt, 12)], 0.04, 0.0, 0.15);
 }
 
 /// Plastic and rough metal in a room: wide and narrow layered lobes.

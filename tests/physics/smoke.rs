@@ -176,6 +176,8 @@ fn methods_agree_in_smoke() {
     agree("smoke, bdpt", &bdpt, &path, 2e-3, 0.15);
     let vcm = seeds(&scene, Method::Vcm, 10, |seed| settings(25, seed));
     agree("smoke, vcm", &vcm, &path, 0.01, 0.15);
+    let mlt = seeds(&scene, Method::Mlt, 10, |seed| settings(25, seed));
+    agree("smoke, mlt", &mlt, &path, 2e-3, 0.15);
     let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(10_000, 0.06, 12, seed));
     agree("smoke, sppm", &sppm, &bdpt, 0.03, 0.3);
 }
@@ -222,6 +224,8 @@ fn methods_agree_by_firelight() {
     let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(30, seed));
     // Paths miss the caustic of the mirror, which is small.
     agree("firelight, bdpt", &bdpt, &path, 5e-3, 0.15);
+    let mlt = seeds(&scene, Method::Mlt, 10, |seed| settings(30, seed));
+    agree("firelight, mlt", &mlt, &bdpt, 2e-3, 0.2);
     let vcm = seeds(&scene, Method::Vcm, 10, |seed| settings(30, seed));
     agree("firelight, vcm", &vcm, &bdpt, 0.01, 0.15);
     let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(10_000, 0.06, 16, seed));
