@@ -47,6 +47,25 @@ fn the_shutter_decides_what_share_of_the_wall_is_seen() {
     assert!(still.read("a.exr").0.layers == still.read("b.exr").0.layers);
 }
 
+/// The studio has no floor below moving objects, and says so.
+#[test]
+fn moving_objects_have_no_studio_floor() {
+    let folder = folder(|_| ());
+    let render = |options: &str, out: &str| {
+        let fixed = "--frames 2 --method path --iterations 2 --reproducible --orbit 20,20";
+        let stderr = run(&folder, &format!("{fixed} {options} -o {out}")).stderr;
+        (stderr.contains("the studio has no floor, because the scene has motion blur"), folder.read(out).0.layers)
+    };
+    let [bare, moving] = ["studio", "studio-floor"]
+        .map(|preset| render(&format!("--light-preset {preset} --shutter 0,0.5"), &format!("{preset}.exr")));
+    assert_eq!((bare.0, moving.0), (false, true));
+    assert!(bare.1 == moving.1, "the picture is not that of a studio without a floor");
+    let [bare, still] = ["studio", "studio-floor"]
+        .map(|preset| render(&format!("--light-preset {preset} --shutter 0"), &format!("still-{preset}.exr")));
+    assert_eq!((bare.0, still.0), (false, false));
+    assert!(bare.1 != still.1, "a still scene has no floor");
+}
+
 /// An object that is there for half of the time covers half of its pixels.
 #[test]
 fn albedo_and_cryptomattes_are_averaged_over_moments() {
