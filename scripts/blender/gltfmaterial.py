@@ -217,9 +217,7 @@ class _Entry:
                             (("", "specular"), ("Color", "specular_colour")) if self.varies(name)})
         if content and (self.varies("metallic") or self.factor("metallic") < 1):  # metals have none
             self.extension("specular", content)
-        if self.factor("film", 0.0) > 0:
-            self.extension("iridescence", {"iridescenceFactor": 1.0, "iridescenceIor": max(self.factor("film_ior"), 1.0),
-                                           "iridescenceThicknessMaximum": self.factor("film")})
+        self._film()
         if self.varies("direction", "anisotropy") or self.factor("anisotropy") > 0:
             content = {"anisotropyStrength": self.factor("anisotropy")}
             if self.varies("direction", "anisotropy"):
@@ -255,6 +253,19 @@ class _Entry:
                 content["sheenColorTexture"] = content["sheenRoughnessTexture"] = shared
             self.extension("sheen", content)
             self.own(sheen_model="fibers")
+
+    def _film(self):
+        """Write the thin film; with a texture, its largest thickness, and none where the texture is black."""
+        film = self.channels["film"]
+        thickest = float(film.max()) if self.varies("film") else self.factor("film", 0.0)
+        if thickest <= 0:
+            return
+        content = {"iridescenceFactor": 1.0, "iridescenceIor": max(self.factor("film_ior"), 1.0),
+                   "iridescenceThicknessMaximum": thickest}
+        if self.varies("film"):
+            content["iridescenceThicknessMinimum"] = 0.0
+            content["iridescenceThicknessTexture"] = self.grey_image("film", film / thickest)
+        self.extension("iridescence", content)
 
     def _coat_ior(self):
         """Write the index of the coat; with a texture, its largest one, and 1 where the texture is black."""

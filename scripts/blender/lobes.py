@@ -175,13 +175,9 @@ class Reader:
     def _film(self, leaf, lobe):
         """Set the thin film. Metals have one from Blender 5.0 on."""
         thickness = self.get(leaf, "Thin Film Thickness")
-        if thickness is None or (bpy.app.version < (5, 0) and lobe.metallic == 1.0):
+        if thickness is None or thickness == 0.0 or (bpy.app.version < (5, 0) and lobe.metallic == 1.0):
             return
-        ior = self.get(leaf, "Thin Film IOR")
-        if self.graph.varies(thickness) or self.graph.varies(ior):
-            self.say("its thin film varies and is not carried")
-            return
-        lobe.film, lobe.film_ior = thickness, ior
+        lobe.film, lobe.film_ior = thickness, self.get(leaf, "Thin Film IOR")
 
     def _dielectric(self, leaf):
         """Glossy facets over a diffuse, refractive or transparent shader, mixed by Fresnel's equations."""

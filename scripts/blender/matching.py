@@ -242,9 +242,6 @@ class _Match:
         if found.thin:
             found.roughness = self._sum([lobe.roughness for lobe in lobes], parts)
         found.tangent = next((lobe.tangent for lobe in lobes if lobe.tangent is not None), None)
-        if not (is_constant(found.film) and is_constant(found.film_ior)):
-            self.say("its thin film varies and is not carried")
-            found.film, found.film_ior = Lobe.film, Lobe.film_ior
         apart = [name.replace("_", " ") for name, weights in over.items() if name not in {"base", "sheet"}
                  and self._differ([getattr(lobe, name) for lobe, w in zip(lobes, weights) if w != 0.0])]
         if apart:

@@ -20,6 +20,7 @@ _PASSES = {
     "specular_colour": ("specular_colour",), "sheen": ("sheen",), "emission": ("emission",),
     "stretch": ("direction", "anisotropy"), "normal": ("normal",), "sheet": ("sheet",), "sheet_colour": ("sheet_colour",),
     "diffuse_roughness": ("diffuse_roughness",), "coat_ior": ("coat_ior",), "coat_colour": ("coat_colour",),
+    "film": ("film", "film_ior"),
 }
 _DISPLAY_NAMES = {
     "base": "Base Color", "transmission": "Transmission", "roughness": "Roughness", "metallic": "Metallic",
@@ -27,14 +28,16 @@ _DISPLAY_NAMES = {
     "sheen_roughness": "Sheen Roughness", "specular_colour": "Specular Tint", "sheen": "Sheen", "emission": "Emission",
     "anisotropy": "Anisotropy", "direction": "the direction of Anisotropy", "normal": "Normal",
     "diffuse_roughness": "Diffuse Roughness", "coat_ior": "Coat IOR", "coat_colour": "Coat Tint", "sheet": "Translucency", "sheet_colour": "the colour of Translucency",
+    "film": "Thin Film Thickness", "film_ior": "Thin Film IOR",
 }
 _UNBAKED_DEFAULTS = {  # values of varying quantities if nothing may be baked
     "base": (0.8,) * 3, "emission": (1.0,) * 3, "roughness": 0.5, "metallic": 0.0, "transmission": 0.0, "alpha": 1.0,
     "ior": 1.5, "specular": 1.0, "specular_colour": (1.0,) * 3, "coat": 0.0, "coat_roughness": 0.0,
     "sheen": (0.0,) * 3, "sheen_roughness": 0.5, "anisotropy": 0.0, "normal": None, "sheet": 0.0,
     "sheet_colour": (1.0,) * 3, "diffuse_roughness": 0.0, "coat_ior": 1.5, "coat_colour": (1.0,) * 3,
+    "film": 0.0, "film_ior": 1.33,
 }
-_MEANS = ("ior",)  # quantities that have no texture
+_MEANS = ("ior", "film_ior")  # quantities that have no texture
 _MIN_ROUGH_METAL = 0.05  # share of texels that is worth a warning
 _STEEP_COSINE, _OLD_STEEP_COSINE = 0.75, 0.97  # between the shading and the surface normal; the latter before Blender 4.5
 _MIN_STEEP = 0.01  # share of texels that is worth a warning

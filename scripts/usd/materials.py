@@ -174,7 +174,11 @@ class Materials:
         def add(extension, value):
             entry.setdefault("extensions", {})[self._document.use(extension)] = value
 
-        if surface.diffuse_roughness:
+        if isinstance(surface.diffuse_roughness, Texture):
+            image = self._textures.data_as_is(surface.diffuse_roughness, 0)
+            image = self._textures.packed({0: surface.diffuse_roughness}) if image is None else image
+            self._own_texture(keys, "diffuse_roughness", 1.0, self._textures.reference(surface.diffuse_roughness, sets, image))
+        elif surface.diffuse_roughness:
             keys.setdefault("diffuse_roughness", surface.diffuse_roughness)
         if surface.ior != 1.5:
             add("KHR_materials_ior", {"ior": max(surface.ior, 1.0)})
@@ -186,14 +190,16 @@ class Materials:
         if surface.coat != 0:
             add("KHR_materials_clearcoat", self._textured(entry, sets, {
                 "clearcoat": (surface.coat, 0), "clearcoatRoughness": (surface.coat_roughness, 1)}))
-            if surface.coat_color != (1.0,) * 3:
-                keys.setdefault("coat_color", list(self._clip(entry, "the colour of its coat", surface.coat_color)))
-            if surface.coat_ior != 1.5:
-                keys.setdefault("coat_ior", max(surface.coat_ior, 1.0))
-        if surface.film * surface.film_thickness > 0:
-            add("KHR_materials_iridescence", {
-                "iridescenceFactor": min(surface.film, 1.0), "iridescenceIor": max(surface.film_ior, 1.0),
-                "iridescenceThicknessMaximum": surface.film_thickness})
+            self._coat(surface, entry, sets, keys)
+        if surface.film > 0 and (isinstance(surface.film_thickness, Texture) or surface.film_thickness > 0):
+            film = {"iridescenceFactor": min(surface.film, 1.0), "iridescenceIor": max(surface.film_ior, 1.0)}
+            if isinstance(surface.film_thickness, Texture):
+                image, film["iridescenceThicknessMaximum"] = self._textures.above(surface.film_thickness, 0.0)
+                film["iridescenceThicknessMinimum"] = 0.0
+                film["iridescenceThicknessTexture"] = self._textures.reference(surface.film_thickness, sets, image)
+            else:
+                film["iridescenceThicknessMaximum"] = surface.film_thickness
+            add("KHR_materials_iridescence", film)
         if any(surface.sheen):
             add("KHR_materials_sheen", {"sheenColorFactor": list(surface.sheen),
                                         "sheenRoughnessFactor": surface.sheen_roughness})
@@ -213,6 +219,25 @@ class Materials:
             add("KHR_materials_dispersion", {"dispersion": surface.dispersion})
         if any(surface.scatter) and not thin and "medium" not in keys:
             keys["medium"] = _medium(surface, self._stage.metres)
+
+    def _coat(self, surface, entry, sets, keys):
+        """Set the colour and the index of a coat."""
+        if isinstance(surface.coat_color, Texture):
+            image, factor = self._textures.color(surface.coat_color)
+            self._own_texture(keys, "coat_color", factor, self._textures.reference(surface.coat_color, sets, image))
+        elif tuple(surface.coat_color) != (1.0,) * 3:
+            keys.setdefault("coat_color", list(self._clip(entry, "the colour of its coat", surface.coat_color)))
+        if isinstance(surface.coat_ior, Texture):
+            image, largest = self._textures.above(surface.coat_ior, 1.0)
+            self._own_texture(keys, "coat_ior", largest, self._textures.reference(surface.coat_ior, sets, image))
+        elif surface.coat_ior != 1.5:
+            keys.setdefault("coat_ior", max(surface.coat_ior, 1.0))
+
+    def _own_texture(self, keys, name, factor, reference):
+        """Set a key of caustique and its texture, unless the stage gives the key itself."""
+        if name not in keys:
+            keys[name] = factor
+            keys.setdefault(name + "_texture", reference)
 
     def _textured(self, entry, sets, parts):
         """Set `NAMEFactor`, and `NAMETexture` if a texture provides the value in the extension's channel."""

@@ -55,7 +55,7 @@ _DEPENDS_ON = {
     "film_thickness": "film", "film_ior": "film", "sheen_color": "sheen", "sheen_roughness": "sheen", "emission_color": "emission",
 }
 _TEXTURED = {"base", "metal", "roughness", "normal", "emission_color", "presence", "coat", "coat_roughness",
-             "transmission"}
+             "coat_color", "coat_ior", "diffuse_roughness", "film_thickness", "transmission"}
 
 
 def surface(shader, reader, losses):
@@ -83,10 +83,10 @@ def surface(shader, reader, losses):
                   presence=presence, ior=given["ior"], specular=given["specular"],
                   specular_color=given["specular_color"], anisotropy=given["anisotropy"], coat=given["coat"],
                   coat_roughness=given["coat_roughness"], thin=bool(given["thin"]),
-                  diffuse_roughness=given["diffuse_roughness"], coat_color=tuple(given["coat_color"]),
+                  diffuse_roughness=given["diffuse_roughness"], coat_color=given["coat_color"],
                   coat_ior=given["coat_ior"])
     out.film, out.film_ior = given["film"], given["film_ior"]
-    out.film_thickness = given["film_thickness"] * _FILM_UNITS[reader.identifier(shader)]
+    out.film_thickness = _scaled(given["film_thickness"], _FILM_UNITS[reader.identifier(shader)])
     out.emission = _scaled(given["emission_color"], given["emission"])
     if given["sheen"]:
         out.sheen_model = "fibers" if reader.identifier(shader) == OPEN_PBR else "charlie"
@@ -125,9 +125,11 @@ def _set_interior(out, given, where, losses):
 
 
 def _scaled(value, factor):
-    """A colour or a texture, multiplied by a number."""
+    """A number, a colour or a texture, multiplied by a number."""
     if isinstance(value, Texture):
         value.scale = tuple(s * factor for s in value.scale[:3]) + (value.scale[3],)
         value.bias = tuple(b * factor for b in value.bias[:3]) + (value.bias[3],)
         return value
-    return value if isinstance(value, Primvar) else tuple(c * factor for c in value)
+    if isinstance(value, tuple):
+        return tuple(c * factor for c in value)
+    return value if isinstance(value, Primvar) else value * factor

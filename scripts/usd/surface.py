@@ -8,7 +8,7 @@ class Surface:
     """A surface shader's parameters. Each is a constant or a `network.Texture`; `base` may be a `network.Primvar`."""
 
     base: object = (0.18, 0.18, 0.18)
-    diffuse_roughness: float = 0.0
+    diffuse_roughness: object = 0.0
     metallic: object = 0.0
     roughness: object = 0.5
     normal: object = None
@@ -22,13 +22,13 @@ class Surface:
     anisotropy: float = 0.0
     coat: object = 0.0
     coat_roughness: object = 0.0
-    coat_color: tuple = (1.0, 1.0, 1.0)
-    coat_ior: float = 1.5
+    coat_color: object = (1.0, 1.0, 1.0)
+    coat_ior: object = 1.5
     sheen: tuple = (0.0, 0.0, 0.0)
     sheen_roughness: float = 0.3
     sheen_model: str = "charlie"
     film: float = 0.0  # share of a thin film, its thickness (nm) and its index of refraction
-    film_thickness: float = 0.0
+    film_thickness: object = 0.0
     film_ior: float = 1.4
     transmission: object = 0.0
     # Transmittance after `depth` (stage units) inside; with depth 0 it tints at the surface, as `base` does.

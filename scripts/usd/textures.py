@@ -88,6 +88,14 @@ class Textures:
         name = next(part for part in parts.values() if not isinstance(part, (int, float)))
         return self._png(texels, self._file(name)[1])
 
+    def above(self, texture, least):
+        """Index of a grey image of a number from `least` to its largest texel, and that texel. Texels below `least` are
+        raised to it."""
+        values = numpy.maximum(self._channel(texture, self._linear(self._load(texture), self._is_srgb(texture))), least)
+        largest = float(values.max())
+        share = (values - least) / max(largest - least, 1e-9)
+        return self._png(numpy.repeat(share, 3, axis=2), self._file(texture)[1]), largest
+
     def with_alpha(self, base, alpha):
         """Index of an image of a colour (a texture, or 3 numbers) with an alpha channel, and the factor of the
         colour."""

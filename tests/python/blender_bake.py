@@ -364,7 +364,7 @@ class Matched(Case):
         self.assertFalse([line for line in warnings if "film" in line])
 
     def test_shaders_with_and_without_a_film_are_mixed(self):
-        """By a texture: indices of films without thickness do not count, and a film of one shader alone is named."""
+        """By a texture: indices of films without thickness do not count, and the thickness of the other is baked."""
         for thickness in (0.0, 300.0):
             with self.subTest(thickness=thickness):
                 checker = self.stage.node("TexChecker")
@@ -373,8 +373,13 @@ class Matched(Case):
                 self.stage.mix(checker.outputs["Fac"], *shaders)
                 material, warnings = self.write()
                 self.assertIn("baseColorTexture", material["pbrMetallicRoughness"])
-                self.assertNotIn("KHR_materials_iridescence", material.get("extensions", {}))
-                self.assertEqual(any("thin film varies" in line for line in warnings), thickness > 0)
+                film = material.get("extensions", {}).get("KHR_materials_iridescence")
+                self.assertEqual(film is not None, thickness > 0)
+                if film:
+                    self.assertAlmostEqual(film["iridescenceThicknessMaximum"], thickness, 3)
+                    self.assertAlmostEqual(film["iridescenceIor"], 1.6, 5)
+                    found = {round(float(share), 1) for share in self.texels(film["iridescenceThicknessTexture"])[..., 1].ravel()}
+                    self.assertLessEqual({0.0, 1.0}, found)
                 self.assertFalse([line for line in warnings if "cannot be exported" in line or "film ior" in line])
 
     def test_metal_has_a_thin_film_from_blender_5_on(self):
@@ -451,6 +456,19 @@ class Matched(Case):
         expected = 0.25 + 0.75 * (places[:, 0] + 1) / 2
         numpy.testing.assert_allclose(linear(found[:, :2]), numpy.stack([expected, expected * 0 + 1], 1), atol=0.02)
         self.assertFalse([line for line in warnings if "mean is taken" in line])
+
+    def test_the_thickness_of_a_film_is_baked(self):
+        """glTF has no texture of its index, whose mean is taken."""
+        self.stage.principled(Thin_Film_Thickness=self.spread(100.0, 500.0), Thin_Film_IOR=self.spread(1.3, 1.5))
+        material, warnings = self.write()
+        film = material["extensions"]["KHR_materials_iridescence"]
+        self.assertEqual((film["iridescenceFactor"], film["iridescenceThicknessMinimum"]), (1.0, 0.0))
+        self.assertAlmostEqual(film["iridescenceIor"], 1.4, delta=0.01)
+        places, found = self.look_up(film["iridescenceThicknessTexture"])
+        expected = 100 + 200 * (places[:, 0] + 1)
+        numpy.testing.assert_allclose(film["iridescenceThicknessMaximum"] * found[:, 1], expected, atol=8)
+        means = [line for line in warnings if "mean is taken" in line]
+        self.assertEqual([line.split(": ")[1] for line in means], ["Thin Film IOR varies"])
 
     def test_colours_of_subsurface_scattering_vary_by_what_the_surface_transmits(self):
         """The medium has the brightest colour; what light loses on its way in and out makes the darker ones."""

@@ -212,6 +212,7 @@ class Textures(usd_support.Stages):
         views = [document["bufferViews"][image["bufferView"]] for image in document.get("images", ())]
         images = [numpy.asarray(Image.open(io.BytesIO(buffer[v["byteOffset"]:v["byteOffset"] + v["byteLength"]])))
                   for v in views]
+        self.sources = [texture["source"] for texture in document.get("textures", ())]
         return document["materials"][0], images, lost
 
     COLOURS = [[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [128, 128, 128]]]
@@ -265,6 +266,53 @@ class Textures(usd_support.Stages):
         found, images, lost = self.made()
         self.assertEqual((images[0].tolist(), lost), ([[[128, 128, 255]]], []))
         self.assertNotIn("scale", found["normalTexture"])
+
+    def test_textures_of_coats_and_of_diffuse_roughness(self):
+        """Of either model, with a factor; raw values are stored as they are, and colours as sRGB."""
+        for kind, names in ((OPEN_PBR, ("base_diffuse_roughness", "coat_weight", "coat_color", "coat_ior")),
+                            (STANDARD, ("diffuse_roughness", "coat", "coat_color", "coat_IOR"))):
+            self.setUp()
+            self.surface_of(kind, **{names[1]: 1.0})
+            grey = [[[51] * 3, [102] * 3], [[204] * 3, [255] * 3]]
+            self.texture("rough", grey, names[0], "r", sourceColorSpace="raw")
+            self.texture("colour", self.COLOURS, names[2], sourceColorSpace="sRGB", scale=(0.5, 0.5, 0.5, 1))
+            self.texture("index", grey, names[3], "r", sourceColorSpace="raw", scale=(2,) * 4, bias=(0.8,) * 4)
+            found, images, lost = self.made()
+            own = found["extras"]["caustique"]
+            textures = [own[f"{name}_texture"]["index"] for name in ("diffuse_roughness", "coat_color", "coat_ior")]
+            self.assertEqual(len(set(textures)), 3)
+            rough, colour, index = (images[self.sources[at]] for at in textures)
+            numpy.testing.assert_array_equal(rough, grey)
+            numpy.testing.assert_array_equal(colour, self.COLOURS)
+            self.assertEqual((own["diffuse_roughness"], own["coat_color"], lost), (1, [0.5] * 3, []))
+            values = 1 + (own["coat_ior"] - 1) * index[:, :, 0] / 255
+            numpy.testing.assert_allclose(values, numpy.array([[1.2, 1.6], [2.4, 2.8]]), atol=0.005)
+
+    def test_the_thickness_of_a_film_by_a_texture(self):
+        for kind, unit in ((OPEN_PBR, 1000.0), (STANDARD, 1.0)):
+            self.setUp()
+            self.surface_of(kind, **({"thin_film_weight": 1.0} if kind == OPEN_PBR else {}))
+            self.texture("film", [[0, 51], [102, 204]], "thin_film_thickness", "r", sourceColorSpace="raw",
+                         scale=(500 / unit,) * 4)
+            found, images, lost = self.made()
+            film = found["extensions"]["KHR_materials_iridescence"]
+            self.assertAlmostEqual(film["iridescenceThicknessMaximum"], 400, 3)
+            self.assertEqual((film["iridescenceThicknessMinimum"], lost), (0, []))
+            texels = images[self.sources[film["iridescenceThicknessTexture"]["index"]]]
+            numpy.testing.assert_allclose(texels[:, :, 1] / 255 * 400, [[0, 100], [200, 400]], atol=1)
+
+    def test_a_key_of_caustique_replaces_a_texture(self):
+        self.surface_of(STANDARD, coat=1.0)
+        self.texture("colour", self.COLOURS, "coat_color", sourceColorSpace="sRGB")
+        self.surface.GetPrim().CreateAttribute("caustique:coat_color", Sdf.ValueTypeNames.Float3).Set(Gf.Vec3f(1, 0.5, 0))
+        self.assertEqual(self.made()[0]["extras"]["caustique"], {"coat_color": [1, 0.5, 0]})
+
+    def surface_of(self, kind, **inputs):
+        """Bind a material of MaterialX with these constants, whose shader `texture` connects."""
+        self.stage.RemovePrim("/Material")
+        self.surface = self.material(kind=kind, context="mtlx", **inputs)
+        self.shader = UsdShade.Shader.Get(self.stage, "/Material/Shader")
+        self.bind(self.square, self.surface)
 
     def test_a_transform_reads_the_same_texel(self):
         said = {"scale": Gf.Vec2f(0.5, 2), "rotation": 30.0, "translation": Gf.Vec2f(0.1, 0.2)}

@@ -38,6 +38,8 @@ FACTORS = {
 }
 #: {material field: its default}, for fields that are keys of `extras.caustique`
 OWN = {"diffuse_roughness": 0.0, "coat_ior": 1.5, "coat_color": (1.0, 1.0, 1.0), "sheen_model": "charlie"}
+#: Material fields of textures that are keys of `extras.caustique`
+OWN_TEXTURES = ("diffuse_roughness_texture", "coat_ior_texture", "coat_color_texture")
 
 
 def pack(
@@ -242,6 +244,9 @@ class Writer:
                 value = float(value) if isinstance(usual, float) else tuple(numbers(value))
             if value != usual:
                 own[name] = value
+        for name in OWN_TEXTURES:
+            if getattr(material, name) is not None:
+                own[name] = self.texture(f"{place}, {name}", getattr(material, name))
         if own:
             item["extras"] = {"caustique": own}
         if extensions:

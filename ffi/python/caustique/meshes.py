@@ -63,6 +63,8 @@ class Material:
     normal_texture: ArrayLike | Texture | None = None
     #: Roughness of diffuse reflection: 0 is Lambertian, 1 is clay or dust.
     diffuse_roughness: float = 0.0
+    #: (H, W, 3) uint8: red multiplies diffuse_roughness, which is 1 if it is left at 0.
+    diffuse_roughness_texture: ArrayLike | Texture | None = None
     #: Strength of a dielectric's reflection, 0 to 1; 0 makes a matte surface Lambertian.
     specular: float = 1.0
     #: Colour (r, g, b) of a dielectric's reflection.
@@ -86,6 +88,10 @@ class Material:
     #: Index of refraction of the clear coat, and the colour (r, g, b) of light that passes it in and out.
     coat_ior: float = 1.5
     coat_color: Triple = (1.0, 1.0, 1.0)
+    #: (H, W, 3) uint8: the index is 1 + (coat_ior - 1) times red.
+    coat_ior_texture: ArrayLike | Texture | None = None
+    #: (H, W, 3) uint8, sRGB; multiplies coat_color.
+    coat_color_texture: ArrayLike | Texture | None = None
     #: Share of the surface that a thin film covers, 0 to 1, its index of refraction and its thickness, nm.
     iridescence: float = 0.0
     iridescence_ior: float = 1.3

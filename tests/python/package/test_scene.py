@@ -129,6 +129,8 @@ class BesideTheCommandLine(unittest.TestCase):
             iridescence=0.5, iridescence_thickness=300.0, diffuse_transmission=0.25,
             anisotropy=0.5, anisotropy_rotation=90, specular_color=(1, 0.5, 0.2), double_sided=True,
             diffuse_roughness=0.5, coat_ior=1.75, coat_color=(1, 0.5, 0.25), sheen_model="fibers",
+            diffuse_roughness_texture=image[..., :3], coat_color_texture=image[..., :3],
+            coat_ior_texture=cq.Texture(pixels=image[..., :3], scale=(2, 2)),
         )
         vertices, triangles = square()
         mesh = cq.Mesh(vertices=vertices, triangles=triangles, uvs=vertices[:, :2], colors=np.ones((4, 3)), material=layered)
@@ -145,9 +147,12 @@ class BesideTheCommandLine(unittest.TestCase):
         self.assertEqual(material["extensions"]["KHR_materials_iridescence"],
                          {"iridescenceFactor": 0.5, "iridescenceThicknessMaximum": 300})
         self.assertEqual(material["extensions"]["KHR_materials_diffuse_transmission"], {"diffuseTransmissionFactor": 0.25})
-        self.assertEqual(material["extras"]["caustique"],
-                         {"diffuse_roughness": 0.5, "coat_ior": 1.75, "coat_color": [1, 0.5, 0.25],
-                          "sheen_model": "fibers"})
+        own = material["extras"]["caustique"]
+        textures = {name: own.pop(f"{name}_texture") for name in ("diffuse_roughness", "coat_ior", "coat_color")}
+        self.assertEqual(own, {"diffuse_roughness": 0.5, "coat_ior": 1.75, "coat_color": [1, 0.5, 0.25],
+                               "sheen_model": "fibers"})
+        self.assertEqual(textures["coat_ior"]["extensions"]["KHR_texture_transform"]["scale"], [2, 2])
+        self.assertEqual(len({found["index"] for found in textures.values()}), 3)
         self.assertAlmostEqual(placed["extensions"]["KHR_texture_transform"]["rotation"], -np.pi / 2)
         self.assertEqual(document["cameras"][0]["orthographic"]["ymag"], 2)
         self.assertEqual(cq.Scene.from_meshes(copies, cameras=[camera], strict=True).warnings, [])
