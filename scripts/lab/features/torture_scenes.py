@@ -324,6 +324,7 @@ def holdout_object(stage):
 @feature
 def shadow_catcher(stage):
     stage.floor.is_shadow_catcher = True
+    stage.scene.render.film_transparent = True
     stage.principled(**GREY)
 
 

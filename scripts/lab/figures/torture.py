@@ -75,15 +75,17 @@ def _bytes(path):
         return file.read()
 
 
-def pixels(path):
-    """The root layer of an EXR, of shape (height, width, 3), with the first row at the bottom."""
+def pixels(path, behind=None):
+    """The root layer of an EXR, of shape (height, width, 3), with the first row at the bottom. `behind`: a picture over
+    which it is composited by its alpha."""
     image = bpy.data.images.load(path)
     values = numpy.empty(len(image.pixels), numpy.float32)
     image.pixels.foreach_get(values)
     width, height = image.size
     channels = image.channels
     bpy.data.images.remove(image)
-    return values.reshape(height, width, channels)[..., :3].astype(float)
+    values = values.reshape(height, width, channels).astype(float)
+    return values[..., :3] if behind is None else values[..., :3] + (1 - values[..., 3:4]) * behind
 
 
 def flip(picture, truth):
@@ -101,8 +103,8 @@ def flip(picture, truth):
         return json.loads(done.stdout)["flip"]
 
 
-def by_cycles(seed):
-    """Renders the open scene by Cycles, without clamping or limits on bounces below 64."""
+def by_cycles(seed, behind=None):
+    """Renders the open scene by Cycles, without clamping or limits on bounces below 64, over the picture `behind`."""
     scene = bpy.context.scene
     scene.render.engine, cycles = "CYCLES", scene.cycles
     cycles.device, cycles.samples, cycles.seed = "CPU", SAMPLES, seed
@@ -116,15 +118,26 @@ def by_cycles(seed):
     settings = scene.render.image_settings
     if hasattr(settings, "media_type"):
         settings.media_type = "IMAGE"
-    settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGB", "32"
+    settings.file_format, settings.color_depth = "OPEN_EXR", "32"
+    settings.color_mode = "RGB" if behind is None else "RGBA"
     with tempfile.TemporaryDirectory() as folder:
         scene.render.filepath = os.path.join(folder, "cycles.exr")
         bpy.ops.render.render(write_still=True)
-        return pixels(scene.render.filepath)
+        return pixels(scene.render.filepath, behind)
 
 
-def by_caustique(scene, seed):
-    """Renders the .glb at `scene` by path tracing; returns the picture and the warnings."""
+def backdrop(stage):
+    """Cycles' picture of the stage without its body: the photograph behind a picture with a transparent film."""
+    render, floor = stage.scene.render, stage.floor
+    stage.body.hide_render, render.film_transparent, floor.is_shadow_catcher = True, False, False
+    try:
+        return by_cycles(3)
+    finally:
+        stage.body.hide_render, render.film_transparent, floor.is_shadow_catcher = False, True, True
+
+
+def by_caustique(scene, seed, behind=None):
+    """Renders the .glb at `scene` by path tracing; returns the picture, over the one `behind`, and the warnings."""
     with tempfile.TemporaryDirectory() as folder:
         picture = os.path.join(folder, "ours.exr")
         settings = {"method": "path", "iterations": SAMPLES, "no_finish": True, "width": SIZE, "height": SIZE}
@@ -134,7 +147,7 @@ def by_caustique(scene, seed):
         if done.returncode:
             raise RuntimeError(done.stderr.strip().splitlines()[-1])
         lines = [line.removeprefix("warning:") for line in done.stderr.splitlines() if line.startswith("warning:")]
-        return pixels(picture), [line.replace(scene + ":", "").strip() for line in lines]
+        return pixels(picture, behind), [line.replace(scene + ":", "").strip() for line in lines]
 
 
 def _cached(key, render):
@@ -184,9 +197,11 @@ def run(name, look=None):
         settings = (SIZE, SAMPLES, bpy.app.version_string)
         # Cycles' picture depends on the code of the feature and of the stage.
         sources = [inspect.getsource(part) for part in (inspect.getmodule(FEATURES[name]), torture_stage)]
-        theirs = _cached(_key("cycles", name, *sources, settings), lambda seed: (by_cycles(seed), []))
+        behind = backdrop(stage) if stage.scene.render.film_transparent else None
+        theirs = _cached(_key("cycles", name, *sources, settings), lambda seed: (by_cycles(seed, behind), []))
+        key = _key("ours", settings, *beside, _bytes(program()), *(() if behind is None else sources))
         try:
-            ours = _cached(_key("ours", settings, *beside, _bytes(program())), lambda seed: by_caustique(path, seed))
+            ours = _cached(key, lambda seed: by_caustique(path, seed, behind))
         except RuntimeError as error:
             return Result(name, REFUSED, 0.0, 0.0, 0.0, 0.0, 0.0, str(error))
     warnings = warnings + ours[2]
