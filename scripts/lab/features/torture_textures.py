@@ -216,6 +216,12 @@ def noise_specular(stage):
 
 
 @feature
+def noise_thin_film(stage):
+    thickness = stage.node("MapRange", _noise(stage).outputs[0], 0.3, 0.7, 200.0, 600.0)
+    stage.principled(Base_Color=(0.05, 0.05, 0.05), Roughness=0.2, Thin_Film_Thickness=thickness.outputs[0])
+
+
+@feature
 def noise_ior(stage):
     stage.principled(
         Base_Color=(0.1, 0.1, 0.1),
