@@ -100,6 +100,7 @@ fn glossy_room() {
 /// A lamp behind glass, seen in varnished walls and sharp metal. Photons find it, and so do camera paths that continue,
 /// which suffice here.
 #[test]
+#[ignore = "long"]
 fn lamp_behind_glass_in_a_varnished_room() {
     let varnish = Material { base_color: [0.5, 0.4, 0.3, 1.0], metallic: 0.0, roughness: 0.35, ..Material::default() };
     let mut description = lit_room(varnish);

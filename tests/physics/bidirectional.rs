@@ -440,6 +440,7 @@ fn furnace_box_with_any_numbers_of_samples() {
 
 /// Any numbers of samples give the picture of path tracing, tile by tile. A tile brighter by a fifth is rejected.
 #[test]
+#[ignore = "long"]
 fn any_numbers_of_samples_agree_with_path_tracing() {
     let scene = small_room();
     let reference = by(&scene, (Method::Path, 24), 0.06, u32::MAX);

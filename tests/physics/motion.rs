@@ -106,6 +106,7 @@ fn rolling_ball(time: f64) -> Description {
 /// The blurred caustic of a moving ball is the mean of 64 still pictures, by every method that finds caustics. Photons of
 /// another moment would give the still picture of the middle, which is refused.
 #[test]
+#[ignore = "long"]
 fn the_caustic_of_a_moving_ball_is_the_mean_of_still_pictures() {
     const STILLS: u64 = 64;
     let moving = Moving(rolling_ball);
