@@ -58,12 +58,14 @@ import world
 _LEANING_DEGREES, _MAX_LEANING_SHARE = 25, 0.02
 
 
-def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None):
+def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None, only=None):
     """Export the open scene (or `scene`) at its current frame to the .glb at `path`. Returns the warnings, a list of
     texts.
 
     `bake_size`: texels per side of baked images; 0 bakes nothing and warns of each loss instead. `progress(text)`
     receives what the export does. The file repeats the warnings as the scene's `losses`. The scene is left unchanged.
+
+    `only`: the objects to export (`selection`), without world and picture settings; None exports all.
     """
     path = os.path.abspath(path)
     scene = scene or bpy.context.scene
@@ -77,12 +79,14 @@ def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None):
 
     with contextlib.ExitStack() as undo:
         _open_scene(scene, undo)
-        progress("Exporting the world")
-        said, sun = world.extras(scene, path, warn)
-        said.update(guard.attempt(warn, f'scene "{scene.name}"', {}, "the picture has the program's own settings",
-                                  camera_export.picture, scene, warn))
+        said, sun = {}, None
+        if only is None:
+            progress("Exporting the world")
+            said, sun = world.extras(scene, path, warn)
+            said.update(guard.attempt(warn, f'scene "{scene.name}"', {}, "the picture has the program's own settings",
+                                      camera_export.picture, scene, warn))
         progress("Exporting the objects")
-        flat = objects.FlatScene(scene, undo, warn, bool(bake_size))
+        flat = objects.FlatScene(scene, undo, warn, bool(bake_size), only)
         _open_scene(flat.scene, undo)
         bpy.context.view_layer.update()
         camera_export.add_cameras(flat, warn)
@@ -119,6 +123,21 @@ def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None):
         del document["extensionsUsed"]
     glb.write(path, document, buffer)
     return warnings
+
+
+def selection(scene, names):
+    """The names of the objects to export after a change of the objects `names`: also those that share a transmissive
+    material with them, because whether it is a solid depends on all its meshes. None if one of them has instances."""
+    instances = [i for i in bpy.context.evaluated_depsgraph_get().object_instances if i.is_instance]
+    instanced = {thing.original.name for i in instances for thing in (i.object, i.parent)}
+    worn = {thing.name: {m.name for m in surfaces.materials_of(thing) if m is not None and may_transmit(m)}
+            for thing in scene.objects if thing.type not in {"LIGHT", "CAMERA", "EMPTY"}}
+    found, size = set(names), 0
+    while len(found) > size:
+        size = len(found)
+        clear = set().union(*(worn.get(name, set()) for name in found))
+        found |= {name for name, materials in worn.items() if materials & clear}
+    return None if found & instanced else found
 
 
 def write_frames(path, first, last, bake_size=bake.SIZE):

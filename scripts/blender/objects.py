@@ -49,7 +49,8 @@ class FlatScene:
     may be baked (`bakes`). `motion`: how the objects move while the shutter is open.
     """
 
-    def __init__(self, scene, undo, warn, bakes=True):
+    def __init__(self, scene, undo, warn, bakes=True, only=None):
+        """`only`: names of the objects to take; None for all."""
         visibility.as_rendered(scene, undo, warn)
         layer = bpy.context.view_layer
         layer.update()
@@ -74,6 +75,9 @@ class FlatScene:
         meshed = {i.object.original for i in depsgraph.object_instances if i.object.type == "MESH"}
         found = []
         for instance in depsgraph.object_instances:
+            if only is not None and instance.object.original.name not in only:
+                concerned.discard(instance.object.original)
+                continue
             concerned.add(instance.object.original)
             kind = instance.object.type
             if kind in {"MESH", "VOLUME"} or kind in _LOST or instance.object.original not in meshed:

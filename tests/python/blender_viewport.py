@@ -6,7 +6,9 @@ import types
 import unittest
 from unittest import mock
 
-import bpy
+import bpy  # first, because it brings the others
+
+import bmesh
 import numpy
 
 from addon import Installed, part_of_addon
@@ -32,13 +34,32 @@ class Viewport(Installed):
             self.view.tick()
             time.sleep(0.01)
 
-    def update(self, *things, geometry=False):
-        """Tell the viewport of changes, as Blender does."""
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        bpy.context.view_layer.update()
-        changes = [types.SimpleNamespace(id=thing, is_updated_geometry=geometry, is_updated_shading=False,
-                                         is_updated_transform=not geometry) for thing in things]
-        self.view.update(types.SimpleNamespace(scene=self.scene, objects=depsgraph.objects, updates=changes))
+    def update(self):
+        """Tell the viewport of what has changed since the last update, as Blender does."""
+        updates = []
+
+        def collect(_, depsgraph):
+            updates.extend(types.SimpleNamespace(
+                id=of.id.original, is_updated_geometry=of.is_updated_geometry, is_updated_shading=of.is_updated_shading,
+                is_updated_transform=of.is_updated_transform) for of in depsgraph.updates)
+
+        bpy.app.handlers.depsgraph_update_post.append(collect)
+        try:
+            bpy.context.view_layer.update()
+        finally:
+            bpy.app.handlers.depsgraph_update_post.remove(collect)
+        objects = bpy.context.evaluated_depsgraph_get().objects
+        self.view.update(types.SimpleNamespace(scene=self.scene, objects=objects, updates=updates))
+
+    def fresh(self, iterations=2):
+        """The picture of a new viewport, which exports the whole scene."""
+        old, self.view = self.view, self.module.Viewport(self.scene, self.layer)
+        self.addCleanup(self.view.close)
+        self.update()
+        pixels = self.show(iterations)
+        self.view.close()
+        self.view = old
+        return pixels
 
     def show(self, iterations=2):
         """Look through the scene's camera, and return the picture after the last iteration."""
@@ -50,8 +71,8 @@ class Viewport(Installed):
         def is_there():
             picture = self.view._live.picture
             live = self.view._live
-            return (picture is not None and picture.about["id"] == live._sent and not live.needs_export
-                    and self.view._exporting is None and picture.about["iteration"] == iterations
+            return (picture is not None and live._ready and picture.about["id"] == live._sent and not live.needs_export
+                    and not self.view._due and self.view._exporting is None and picture.about["iteration"] == iterations
                     and not picture.about["coarse"])
 
         self.until(is_there)
@@ -65,7 +86,7 @@ class Viewport(Installed):
         self.assertEqual(self.view._exports, 1)
 
         self.scene.camera.location.x += 0.5  # no export
-        self.update(self.scene.camera)
+        self.update()
         moved = self.show()
         self.assertFalse(numpy.array_equal(first, moved))
         self.assertEqual(self.view._exports, 1)
@@ -73,22 +94,97 @@ class Viewport(Installed):
         ball = bpy.data.objects["ball"]
         ball.location.x -= 0.4
         ball.rotation_euler.z = 0.3
-        self.update(ball)
+        self.update()
         placed = self.show()
         self.assertEqual(self.view._exports, 1, "a moved object is not exported again")
         self.assertFalse(numpy.array_equal(moved, placed))
 
         # A new export of the scene gives the same picture, up to rounding.
-        self.update(bpy.data.materials[0])
-        self.until(lambda: self.view._exports == 2)
-        fresh = self.show()
+        fresh = self.fresh()
         noise = numpy.abs(fresh - placed).mean() / placed[..., :3].mean()
         self.assertLess(noise, 0.02)
 
         bpy.data.objects.remove(ball)
         self.update()
-        self.until(lambda: self.view._exports == 3)
+        self.until(lambda: self.view._exports == 2)
         self.assertFalse(numpy.array_equal(self.show(), fresh))
+
+    def test_changed_materials_meshes_and_lamps_are_exported_alone(self):
+        second = self.ball("second", at=(1, 1, 0.5), radius=0.3)
+        third = self.plane(size=1, at=(-1, 1, 0.5))
+        lamp = bpy.data.lights.new("spot", "SPOT")
+        self.put("spot", lamp, (0, 0, 3))
+        self.update()
+        before = self.show()
+        exported = []
+        take, self.view._take_part = self.view._take_part, lambda path, places: (exported.append(set(places)), take(path, places))
+
+        def check(change, names):
+            nonlocal before
+            change()
+            self.update()
+            after = self.show()
+            self.assertEqual(exported.pop(), names)
+            self.assertFalse(exported)
+            self.assertFalse(numpy.array_equal(before, after), "the change is not seen")
+            self.assertTrue(numpy.array_equal(after, self.fresh()), "the picture differs from that of a whole export")
+            before = after
+
+        def shader(thing):
+            return next(n for n in thing.active_material.node_tree.nodes if n.type == "BSDF_PRINCIPLED").inputs
+
+        def paint():
+            shader(third)["Base Color"].default_value = 0.9, 0.1, 0.1, 1
+
+        def bend():
+            third.data.vertices[0].co.z += 0.2
+            third.data.update()
+
+        def open_glass():
+            # The material is no solid any more, so that the other ball changes, too.
+            shape = bmesh.new()
+            shape.from_mesh(second.data)
+            bmesh.ops.delete(shape, geom=[v for v in shape.verts if v.co.z > 0.1], context="VERTS")
+            shape.to_mesh(second.data)
+            shape.free()
+            second.data.update()
+
+        second.data.materials[0] = bpy.data.objects["ball"].active_material
+        self.update()
+        before = self.show()
+        self.assertEqual((self.view._exports, exported), (2, []), "another material is a change of the whole scene")
+        check(paint, {third.name})
+        check(bend, {third.name})
+        check(lambda: setattr(lamp, "energy", 40), {"spot"})
+        check(open_glass, {"ball", "second"})
+        check(lambda: third.modifiers.new("thick", "SOLIDIFY"), {third.name})
+        # Settings read the scene again, with all edits.
+        third.location.x -= 0.3
+        self.settings.iterations = 3
+        self.update()
+        moved = self.show(iterations=3)
+        self.assertFalse(exported)
+        self.assertLess(numpy.abs(moved - self.fresh(iterations=3)).mean() / moved[..., :3].mean(), 0.01)
+
+    def test_other_changes_export_the_whole_scene(self):
+        self.scene.world = bpy.data.worlds.new("world")
+        empty = self.put("copies", None, (1, 0, 0))
+        group = bpy.data.collections.new("group")
+        group.objects.link(self.ball("copied", at=(0, 1, 0.3), radius=0.2))
+        empty.instance_type, empty.instance_collection = "COLLECTION", group
+        self.update()
+        self.show()
+        self.scene.world.color = 1, 0, 0
+        self.update()
+        self.show()
+        self.assertEqual((self.view._exports, self.view._parts), (2, []))
+        # An object with copies: the second Blender finds them.
+        shader = next(n for n in bpy.data.objects["copied"].active_material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
+        shader.inputs["Base Color"].default_value = 0, 1, 0, 1
+        self.update()
+        after = self.show()
+        self.assertEqual((self.view._exports, self.view._parts), (3, []))
+        self.assertTrue(numpy.array_equal(after, self.fresh()))
 
     def test_settings_apply_without_an_export(self):
         self.update()
@@ -117,6 +213,17 @@ class Viewport(Installed):
 
 
 class Cameras(Installed):
+    def test_the_first_picture_takes_its_time_on_any_machine(self):
+        live = part_of_addon("live")
+        for pixel_seconds, expected in ((3e-4, 16), (6e-6, 5), (3e-7, 2)):
+            coarse = live._COARSE
+            for _ in range(8):
+                coarse = live.coarser(coarse, 960 * 540 / coarse**2 * pixel_seconds)
+                self.assertLessEqual(coarse, 16)
+            self.assertEqual(coarse, live.coarser(coarse, 960 * 540 / coarse**2 * pixel_seconds), "it settles")
+            self.assertEqual(coarse, expected)
+        self.assertEqual(live.coarser(4, 100.0), 8, "one slow picture is no reason for a very coarse one")
+
     def test_blender_s_matrices_give_the_program_s_camera(self):
         live = part_of_addon("live")
         camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
@@ -163,13 +270,14 @@ class Cameras(Installed):
         for width in (2, 3, 4):
             state.want({"width": width})
         self.assertEqual([fields.get("width") for _, fields in sent], [None, 1])
-        about = {"id": 2, "iteration": 1, "iterations": 4, "coarse": True}
+        coarse = sent[-1][1]["coarse"]
+        about = {"id": 2, "iteration": 1, "iterations": 4, "coarse": True, "seconds": 0.6}
         state.shown(mock.Mock(about=about))
-        self.assertEqual(sent[-1], ("view", {"width": 4}))
+        self.assertEqual(sent[-1], ("view", {"width": 4, "coarse": 2 * coarse}), "the next one is coarser")
         self.assertEqual(len(sent), 3)
         state.answered({"event": "stopped", "id": 2})
         self.assertEqual(len(sent), 3)
-        state.place({"a": [0] * 16})
+        state.edit({"a": [0] * 16})
         state.answered({"event": "error", "id": 4, "message": "it cannot", "hint": ""})
         self.assertTrue(state.needs_export)
 

@@ -2,7 +2,8 @@
 
 The job is an object: `blend` (the file), `scene`, `view_layer`, `frame` (with its fraction), `scripts` (whether Python
 in the file may run), `exporter` (the folder of export.py), `glb` (the file to write), `progress` (the file to write what
-it does to) and `report` (the file to write {"warnings": [..]} or {"error": "..", "place": ".."} to).
+it does to), `only` (names of changed objects to export, or null for all) and `report` (the file to write
+{"warnings": [..], "only": [..]} or {"error": "..", "place": ".."} to; `only` has the exported objects, or is null for all).
 """
 
 import json
@@ -14,7 +15,7 @@ import bpy
 
 
 def export(job):
-    """Export the scene and frame that `job` names to its GLB file. Returns the exporter's warnings."""
+    """Export the scene and frame that `job` names to its GLB file. Returns the report."""
     bpy.ops.wm.open_mainfile(filepath=job["blend"], load_ui=False, use_scripts=job["scripts"])
     scene = bpy.data.scenes[job["scene"]]
     bpy.context.window.scene = scene
@@ -33,7 +34,9 @@ def export(job):
             file.write(text)
         os.replace(job["progress"] + ".new", job["progress"])
 
-    return exporter.write(job["glb"], progress=tell)
+    only = None if job["only"] is None else exporter.selection(scene, job["only"])
+    warnings = exporter.write(job["glb"], progress=tell, only=only)
+    return {"warnings": warnings, "only": None if only is None else sorted(only)}
 
 
 def place_of(error, folder):
@@ -49,7 +52,7 @@ def main(path):
     with open(path, encoding="utf-8") as file:
         job = json.load(file)
     try:
-        report = {"warnings": export(job)}
+        report = export(job)
     except Exception as error:  # the first Blender shows any error of this one
         traceback.print_exc()
         report = {"error": f"{type(error).__name__}: {error}", "place": place_of(error, job["exporter"])}

@@ -30,9 +30,9 @@ _tasks = queue.SimpleQueue()  # for the main thread, from the threads of renders
 class Job:
     """An export to the file `GLB` in a folder. `run` may be called from any thread."""
 
-    def __init__(self, scene, view_layer, frame, folder, blender):
+    def __init__(self, scene, view_layer, frame, folder, blender, only=None):
         """Prepare the export of `scene` at `frame` (a float) to the empty `folder`. `blender`: another exporting
-        program."""
+        program. `only`: names of changed objects, to export them and what depends on them; None for the whole scene."""
         if not blender and bpy.app.version < _OLDEST:
             raise Fault(f"Blender {bpy.app.version_string} cannot export what caustique needs",
                         "choose in the add-on's preferences, as Exporter, a Blender of 4.2 or newer, or the Python of "
@@ -42,11 +42,12 @@ class Job:
         self._blend = os.path.join(folder, "scene.blend")
         self._job = {
             "blend": self._blend, "scene": scene.name, "view_layer": view_layer, "frame": frame,
-            "scripts": scripts_allowed(),
+            "scripts": scripts_allowed(), "only": only,
             "exporter": os.path.join(_HERE, "exporter"), "glb": os.path.join(folder, GLB),
             "report": os.path.join(folder, "report.json"), "progress": os.path.join(folder, "progress.txt"),
         }
         self._scene, self._said = scene, None
+        self.only = None  # after `run`: names of the exported objects, or None for the whole scene
 
     def copy(self):
         """Write the scene and its data to a file. Call it in Blender's main thread. Returns warnings."""
@@ -113,6 +114,7 @@ class Job:
             raise Fault(f"the scene could not be exported: {report['error']}",
                         f"this is a fault of caustique's exporter ({place}): report it with the scene" if place else
                         "try File > Export > glTF 2.0, which shows what it stumbles over")
+        self.only = report["only"]
         return report["warnings"]
 
 

@@ -4,15 +4,18 @@ The program is sent one view at a time: while the mouse moves, the next one wait
 so that every view is seen. The scene is exported again when the program cannot apply an edit.
 """
 
+import json
 import math
+import struct
 import threading
 
 import numpy
 
 #: From Blender's axes (z up) to those of glTF (y up).
 TO_GLTF = numpy.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)
-#: The first picture has this fraction of the pixels per side.
-COARSE = 4
+_FIRST_SECONDS = 0.15  # that the first picture of a view may take
+_COARSE = 4  # ratio of the sides of a picture to those of its first picture, until the time of one is known
+_COARSE_LIMITS = 2, 16
 _RIGID = 1e-4  # largest deviation of a rotation from an orthonormal matrix
 
 
@@ -28,6 +31,7 @@ class Live:
         self._ready, self._edits = False, set()  # whether a scene is loaded; numbers of edits and loads under way
         self._changed = False  # whether a picture or a message is new
         self._loading = None
+        self._coarse = _COARSE
 
     def load(self, path, arguments):
         """Load an exported scene."""
@@ -35,17 +39,19 @@ class Live:
             self._ready, self._pending, self.fault, self._edits = False, None, None, set()
             self._loading = self._send("load", scene=path, arguments=arguments)
 
-    def place(self, places):
-        """Place objects: {name: column-major matrix in glTF's axes}."""
+    def edit(self, places, files=()):
+        """Replace the objects that exported files hold, and place objects: {name: column-major matrix in glTF's axes}. The
+        program obeys in order, so an edit may follow a load at once."""
         with self._lock:
-            if not places or not self._ready:
+            if not (places or files) or self._loading is None:
                 return
             listed = [{"name": name, "matrix": matrix} for name, matrix in places.items()]
-            self._edits.add(self._send("edit", place=listed))
-            self._begin()
+            self._edits.add(self._send("edit", place=listed, files=list(files)))
+            if self._ready:
+                self._begin()
 
     def want(self, view):
-        """Show a view, the fields of the command `view`; nothing happens if it is the one that is shown."""
+        """Show a view, the fields of the command `view` without `coarse`; nothing happens if it is the one that is shown."""
         with self._lock:
             if view == self._wanted:
                 return
@@ -55,7 +61,7 @@ class Live:
 
     def _begin(self):
         if self._wanted is not None:
-            self._pending = self._sent = self._send("view", **self._wanted)
+            self._pending = self._sent = self._send("view", **self._wanted, coarse=self._coarse)
             self._begun = self._wanted
 
     def answered(self, answer):
@@ -89,6 +95,8 @@ class Live:
         with self._lock:
             self.picture, self._changed, self.fault = picture, True, None
             about = picture.about
+            if about["coarse"]:
+                self._coarse = coarser(self._coarse, about["seconds"])
             of = f" of {about['iterations']}" if about["iterations"] and not about["coarse"] else ""
             self.message = "caustique" if about["coarse"] else f"caustique: iteration {about['iteration']}{of}"
             if about["id"] == self._pending:
@@ -105,6 +113,13 @@ class Live:
         with self._lock:
             changed, self._changed = self._changed, False
             return changed
+
+
+def coarser(coarse, seconds):
+    """The ratio of sides by which the next first picture takes `_FIRST_SECONDS`, if the last one, with the ratio `coarse`,
+    took `seconds`: its time grows with its pixels."""
+    least, most = _COARSE_LIMITS
+    return min(max(math.ceil(coarse * math.sqrt(seconds / _FIRST_SECONDS)), least), 2 * coarse, most)
 
 
 def camera(view_matrix, window_matrix, back=0.0):
@@ -139,6 +154,12 @@ def moved(before, after, exported, is_light):
     if not numpy.isfinite(change).all() or abs(numpy.linalg.det(turn)) < 1e-12:
         return None
     return TO_GLTF @ change @ numpy.linalg.inv(TO_GLTF) @ exported
+
+
+def document(data):
+    """The JSON of the bytes of a .glb file."""
+    length = struct.unpack("<5I", data[:20])[3]
+    return json.loads(data[20:20 + length])
 
 
 def exported_places(document):

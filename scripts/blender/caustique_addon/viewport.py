@@ -4,14 +4,13 @@ Blender calls `update` when the scene has changed and `draw` when it draws; both
 thread starts exports and redraws the viewports, because neither `draw` nor other threads may do that.
 """
 
-import json
 import os
 import shutil
-import struct
 import tempfile
 import threading
 import time
 import weakref
+from typing import NamedTuple
 
 import bpy
 import numpy
@@ -21,8 +20,7 @@ from .fault import Cancelled, Fault, fault_from_error
 
 _TIMER_SECONDS = 0.05
 _QUIET_SECONDS = 0.4  # without changes, before the scene is exported again
-_MATTERS = (bpy.types.Mesh, bpy.types.Curve, bpy.types.Material, bpy.types.World, bpy.types.Light, bpy.types.Image,
-            bpy.types.NodeTree, bpy.types.Texture, bpy.types.Collection, bpy.types.MetaBall)
+_MATTERS = (bpy.types.Curve, bpy.types.Image, bpy.types.Texture, bpy.types.Collection, bpy.types.MetaBall)
 _PLACED = ("MESH", "LIGHT")
 _open = weakref.WeakSet()
 
@@ -37,9 +35,13 @@ class Viewport:
         self._folder = tempfile.mkdtemp(prefix="caustique-", dir=bpy.app.tempdir)
         self._exporting, self._closed, self._exports = None, False, 0
         self._changed_at = -_QUIET_SECONDS  # the first export waits for nothing
-        self._places, self._lights = {}, set()  # of the last export: {object: matrix}, names of lights
-        self._next_places = None
-        self._exported = {}  # {object: its matrix in the exported file}
+        self._state = _State({}, {}, set())  # what the program shows
+        self._due = set()  # names of changed objects, to be exported again
+        self._exported = {}  # {object: its matrix in the exported files, or by an edit since}
+        self._moved = {}  # {object: its matrix by an edit since its export}
+        self._parts = []  # exports of single objects since that of the scene: (names, path)
+        self._old = []  # folders of exports that newer ones replace
+        self._loaded_words = None  # the settings that the program has loaded the scene with
         self._words, self._path, self._texture, self._drawn = None, None, None, None
         # The program answers at once, in another thread.
         self._server = server.Server(program.find(chosen.program), command.threads(scene.render), self._answered,
@@ -55,28 +57,39 @@ class Viewport:
             self._words = words
             if self._path is not None and self._exporting is None:
                 self._load()
-        places, _ = _places_of(depsgraph)
-        if places.keys() != self._places.keys() or any(_is_new(update) for update in depsgraph.updates):
-            self._live.needs_export, self._changed_at = True, time.monotonic()
-        if self._live.needs_export or self._exporting is not None:
-            return
-        moved = {name: place for name, place in places.items() if not numpy.array_equal(place, self._places[name])}
+        state = _state_of(depsgraph)
+        same = state.places.keys() == self._state.places.keys() and state.worn == self._state.worn
+        names = _concerned(depsgraph, state) if same else None
+        if names is None or not names <= self._exported.keys():
+            self._live.needs_export = True
+        else:
+            self._due |= names
+        if names is None or names:
+            self._changed_at = time.monotonic()
+        if self._exporting is None and not self._live.needs_export and not self._due:
+            self._move(state)
+
+    def _move(self, state):
+        """Place the objects that have moved. Those that have to be exported again are due."""
         edits = {}
-        for name, place in moved.items():
-            known = self._exported.get(name)
-            changed = None if known is None else live.moved(self._places[name], place, known, name in self._lights)
+        for name, place in state.places.items():
+            before, known = self._state.places[name], self._exported.get(name)
+            if known is None or numpy.array_equal(place, before):
+                continue
+            changed = live.moved(before, place, known, name in state.lights)
             if changed is None:
-                self._live.needs_export, self._changed_at = True, time.monotonic()
-                return
-            edits[name], self._exported[name] = live.columns(changed), changed
-        self._places = places
-        self._live.place(edits)
+                self._due.add(name)
+                self._changed_at = time.monotonic()
+            else:
+                self._exported[name], self._moved[name] = changed, live.columns(changed)
+                edits[name] = self._moved[name]
+        self._state = state
+        self._live.edit(edits)
 
     def want(self, view_matrix, window_matrix, back, size, lens=None):
         """Show the scene through this view."""
         camera = {**live.camera(view_matrix, window_matrix, back), **(lens or {})}
-        self._live.want({"camera": camera, "width": size[0], "height": size[1], "coarse": live.COARSE,
-                         "arguments": []})
+        self._live.want({"camera": camera, "width": size[0], "height": size[1], "arguments": []})
 
     def draw(self, engine, scene, size):
         """Draw the last picture over a region of this size in pixels. Returns a message, and a Fault or None."""
@@ -113,8 +126,10 @@ class Viewport:
         """Start an export if one is due. Returns whether the viewport has to be redrawn."""
         if self._exporting is not None and not self._exporting.is_alive():
             self._exporting = None
-            self._places = self._next_places or {}
-        due = self._live.needs_export and time.monotonic() - self._changed_at >= _QUIET_SECONDS
+            state = _state_of(bpy.context.evaluated_depsgraph_get())
+            if not self._live.needs_export and state.places.keys() == self._state.places.keys():
+                self._move(state)  # what has moved meanwhile
+        due = (self._live.needs_export or self._due) and time.monotonic() - self._changed_at >= _QUIET_SECONDS
         if due and self._exporting is None and not self._closed:
             self._start_export()
         return self._live.take_change()
@@ -123,16 +138,21 @@ class Viewport:
         scene = bpy.data.scenes.get(self._scene)
         if scene is None:
             return
-        self._live.needs_export = False
+        only = None if self._live.needs_export else sorted(self._due)
         self._exports += 1
+        while self._old:
+            shutil.rmtree(self._old.pop(), ignore_errors=True)
         folder = os.path.join(self._folder, str(self._exports))
         os.mkdir(folder)
         try:
             chosen = preferences.get(bpy.context)
             frame = scene.frame_current + scene.frame_subframe
-            job = handoff.Job(scene, self._layer, frame, folder, chosen.exporter)
-            depsgraph = bpy.context.evaluated_depsgraph_get()
-            self._next_places, self._lights = _places_of(depsgraph)
+            job = handoff.Job(scene, self._layer, frame, folder, chosen.exporter, only)
+            state = _state_of(bpy.context.evaluated_depsgraph_get())
+            if only is not None:
+                self._move(state)  # others than those to be exported may have moved
+            self._state = state
+            self._live.needs_export, self._due = False, set()
             warnings = job.copy()
         except Exception as error:  # a timer would be removed
             self._fail(error)
@@ -146,18 +166,45 @@ class Viewport:
     def _export(self, job, folder, warnings):
         try:
             warnings = warnings + job.run(lambda: self._closed)
-            self._path = os.path.join(folder, handoff.GLB)
-            self._exported = live.exported_places(_document(self._path))
-            self._load()
-            session.warnings[self._scene] = warnings
+            path = os.path.join(folder, handoff.GLB)
+            with open(path, "rb") as file:
+                places = live.exported_places(live.document(file.read()))
+            if job.only is None:
+                self._take_scene(path, places)
+                session.warnings[self._scene] = warnings
+            elif places.keys() >= set(job.only):
+                self._take_part(path, {name: places[name] for name in job.only})
+                known = session.warnings.setdefault(self._scene, [])
+                known += [line for line in warnings if line not in known]
+            else:  # an object has no faces any more, or several have its name
+                self._live.needs_export = True
         except Cancelled:
             pass
         except Exception as error:  # a thread would lose it
             self._fail(error)
 
+    def _take_scene(self, path, places):
+        """Show an export of the scene."""
+        self._old += [os.path.dirname(old) for old in [self._path, *(part for _, part in self._parts)] if old]
+        self._path, self._exported, self._moved, self._parts = path, places, {}, []
+        self._load()
+
+    def _take_part(self, path, places):
+        """Show an export of single objects."""
+        self._old += [os.path.dirname(old) for names, old in self._parts if names <= places.keys()]
+        self._parts = [part for part in self._parts if not part[0] <= places.keys()] + [(set(places), path)]
+        self._exported.update(places)
+        self._moved = {name: matrix for name, matrix in self._moved.items() if name not in places}
+        if self._words == self._loaded_words:
+            self._live.edit({}, [path])
+        else:  # the settings have changed during the export
+            self._load()
+
     def _load(self):
+        self._loaded_words = self._words
         # A viewport shows one moment, without motion blur.
         self._live.load(self._path, [*self._words, "--shutter", "0"])
+        self._live.edit(self._moved, [path for _, path in self._parts])
 
     def _fail(self, error):
         fault = fault_from_error(error)
@@ -172,31 +219,51 @@ class Viewport:
             self._live.shown(picture)
 
 
-def _is_new(update):
-    """Whether a change is more than the place of an object, the camera or the window."""
-    thing = update.id
-    if isinstance(thing, bpy.types.Object):
-        return update.is_updated_geometry and thing.type != "CAMERA"
-    return isinstance(thing, _MATTERS) and (update.is_updated_geometry or update.is_updated_shading
-                                            or isinstance(thing, (bpy.types.Material, bpy.types.World, bpy.types.NodeTree)))
+def _concerned(depsgraph, state):
+    """The names of the objects that have to be exported again after the changes of a depsgraph; None for the whole scene. A
+    changed place, camera or window needs no export."""
+    names, materials, data = set(), set(), set()
+    for update in depsgraph.updates:
+        thing = update.id
+        if isinstance(thing, bpy.types.Object):
+            if update.is_updated_geometry and thing.type != "CAMERA":
+                names.add(thing.name)
+        elif isinstance(thing, bpy.types.Material):
+            materials.add(thing.name)
+        elif isinstance(thing, (bpy.types.Mesh, bpy.types.Light)):
+            if update.is_updated_geometry:
+                data.add(thing.name)
+        elif isinstance(thing, bpy.types.NodeTree):
+            if not thing.original.is_embedded_data:  # the owner of one that is embedded is listed, too
+                return None
+        elif isinstance(thing, bpy.types.World):
+            return None
+        elif isinstance(thing, _MATTERS) and (update.is_updated_geometry or update.is_updated_shading):
+            return None
+    return names | {thing.name for thing in depsgraph.objects if materials.intersection(state.worn[thing.name])
+                    or (thing.type in _PLACED and thing.data.name in data)}
 
 
-def _places_of(depsgraph):
-    """The matrices of the meshes and lights in a scene that are no instances, {name: matrix}, and the names of lights."""
-    places, lights = {}, set()
+class _State(NamedTuple):
+    """What a viewport compares of a scene: the matrices of meshes and lights that are no instances, {name: matrix}; the names
+    of the materials of all objects, {name: names}; and the names of lights."""
+
+    places: dict
+    worn: dict
+    lights: set
+
+
+def _state_of(depsgraph):
+    places, worn, lights = {}, {}, set()
     for thing in depsgraph.objects:
+        # Modifiers add materials to the evaluated mesh.
+        used = [slot.material for slot in thing.material_slots] + list(getattr(thing.data, "materials", ()))
+        worn[thing.name] = tuple(dict.fromkeys(material.name for material in used if material is not None))
         if thing.type in _PLACED:
             places[thing.name] = numpy.array(thing.matrix_world, float)
             if thing.type == "LIGHT":
                 lights.add(thing.name)
-    return places, lights
-
-
-def _document(path):
-    """The JSON of a .glb file."""
-    with open(path, "rb") as file:
-        _, _, _, length, _ = struct.unpack("<5I", file.read(20))
-        return json.loads(file.read(length))
+    return _State(places, worn, lights)
 
 
 def lens(camera, engine_is_orthographic):
