@@ -22,6 +22,8 @@ def contents():
     """The contents of the zip: {name in the zip: source file}."""
     addon = os.path.join(_HERE, "caustique_addon")
     files = {name: os.path.join(addon, name) for name in os.listdir(addon) if name.endswith((".py", ".toml", ".json"))}
+    presets = os.path.join(addon, "presets")
+    files.update((f"presets/{name}", os.path.join(presets, name)) for name in os.listdir(presets) if name.endswith(".py"))
     files.update((f"exporter/{os.path.basename(source)}", source) for source in _exporter())
     files.update((name, os.path.join(_ROOT, name)) for name in ("LICENSE-MIT", "LICENSE-APACHE"))
     return {f"{_NAME}/{name}": files[name] for name in sorted(files)}

@@ -1,5 +1,7 @@
 """Tests the add-on's panels: settings that the exporter reads are reachable, presets of glass, and priorities. Needs bpy."""
 
+import os
+import pathlib
 import types
 import unittest
 from unittest import mock
@@ -11,6 +13,9 @@ from addon import Installed, part_of_addon
 
 import export
 import glb
+
+
+SUBDIR = "caustique_render"
 
 
 class Panels(Installed):
@@ -54,6 +59,55 @@ class Panels(Installed):
                 self.assertEqual(wanted - self.drawn(module, name), set())
         self.scene.render.engine = self.context.engine = "CYCLES"
         self.assertFalse(part_of_addon("scene_panels").FilmPanel.poll(self.context))
+
+
+class Presets(Installed):
+    def test_supplied_presets_set_the_options(self):
+        folder = pathlib.Path(part_of_addon("presets_menu").__file__).parent / "presets"
+        given = {}
+        for path in sorted(folder.glob("*.py")):
+            self.settings.seed, self.settings.arguments = 7, "--max-depth 8"
+            self.assertEqual(bpy.ops.script.execute_preset(filepath=str(path), menu_idname="CAUSTIQUE_PT_presets"), {"FINISHED"})
+            words = part_of_addon("command").method(self.settings)
+            self.assertEqual(words[words.index("--seed") + 1], "7", "a preset leaves the seed alone")
+            self.assertIn("--max-depth", words)
+            given[path.stem] = [word for word in words if word in {"--iterations", "--time", "--target-error"}]
+        self.assertEqual(given, {"draft": ["--iterations"], "preview": ["--time"], "farm": ["--iterations"],
+                                 "final": ["--iterations", "--target-error"]})
+
+    def test_users_add_presets_and_remove_them(self):
+        with mock.patch.dict(os.environ, {"BLENDER_USER_SCRIPTS": str(self.dir / "scripts")}), \
+                mock.patch.object(bpy.utils, "user_resource", lambda *_, path="", **__: self.made(path)), \
+                mock.patch.object(bpy.utils, "script_paths", lambda *_, **__: [str(self.dir / "scripts" / "presets")]):
+            self.settings.iterations, self.settings.finish, self.settings.use_volume = 99, "own", False
+            self.assertEqual(bpy.ops.caustique.add_preset(name="My own"), {"FINISHED"})
+            path = self.dir / "scripts" / "presets" / "caustique_render" / "My_own.py"
+            self.assertTrue(path.is_file())
+            self.settings.iterations, self.settings.finish, self.settings.use_volume = 1, "off", True
+            bpy.ops.script.execute_preset(filepath=str(path), menu_idname="CAUSTIQUE_PT_presets")
+            found = self.settings.iterations, self.settings.finish, self.settings.use_volume
+            self.assertEqual(found, (99, "own", False))
+            bpy.ops.caustique.add_preset(name="My own", remove_name=True)
+            self.assertFalse(path.exists())
+
+    def made(self, path):
+        """A folder of the user's scripts, which is made if it does not exist."""
+        folder = self.dir / "scripts" / path
+        folder.mkdir(parents=True, exist_ok=True)
+        return str(folder)
+
+    def test_the_menu_lists_supplied_presets_and_those_of_users(self):
+        kind = part_of_addon("presets_menu").Presets
+        layout, listed = mock.MagicMock(), []
+        panel = types.SimpleNamespace(
+            layout=layout, preset_operator=kind.preset_operator, preset_subdir=SUBDIR, bl_idname=kind.bl_idname,
+            path_menu=lambda folders, *_, **__: listed.append(list(folders)))
+        kind.draw(panel, bpy.context)
+        self.assertEqual(len(listed), 2)
+        self.assertEqual({"draft.py", "farm.py", "final.py", "preview.py"}, set(os.listdir(listed[0][0])) - {"__pycache__"})
+        head = types.SimpleNamespace(layout=mock.MagicMock())
+        part_of_addon("panels").MethodPanel.draw_header_preset(head, bpy.context)
+        self.assertEqual(head.layout.popover.call_args.kwargs["panel"], "CAUSTIQUE_PT_presets")
 
 
 class Substances(Installed):

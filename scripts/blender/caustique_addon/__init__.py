@@ -7,7 +7,8 @@ running (`viewport`, `live`, `server`). The program renders; the panels show its
 """
 
 from . import (
-    blender_panels, diagnosis, engine, handoff, material_panel, panels, preferences, properties, scene_panels, viewport,
+    blender_panels, diagnosis, engine, handoff, material_panel, panels, preferences, presets_menu, properties, scene_panels,
+    viewport,
 )
 
 # Blender before 4.2 reads this dictionary, later versions blender_manifest.toml.
@@ -22,7 +23,8 @@ bl_info = {
 }
 
 # Order matters: the engine and the panels use the properties.
-_PARTS = (preferences, properties, handoff, viewport, engine, diagnosis, panels, scene_panels, material_panel, blender_panels)
+_PARTS = (preferences, properties, handoff, viewport, engine, diagnosis, presets_menu, panels, scene_panels, material_panel,
+          blender_panels)
 
 
 def register():

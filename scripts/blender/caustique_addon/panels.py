@@ -5,6 +5,7 @@ import bpy
 from . import program_plan, properties, session, text_layout
 from .diagnosis import Diagnose, Select
 from .panel import Panel
+from .presets_menu import Presets
 
 _STOPS = ("iterations", "time", "error")
 
@@ -14,6 +15,10 @@ class MethodPanel(Panel, bpy.types.Panel):
 
     bl_idname = "CAUSTIQUE_PT_method"
     bl_label = "Method"
+
+    def draw_header_preset(self, context):
+        """Draw the button of the presets."""
+        Presets.draw_panel_header(self.layout)
 
     def draw(self, context):
         column, settings = self._column(), context.scene.caustique_render
