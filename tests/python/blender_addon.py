@@ -3,6 +3,7 @@
 import concurrent.futures
 import math
 import os
+import pathlib
 import re
 import threading
 import time
@@ -301,6 +302,7 @@ class Stops(Installed):
         super().setUp()
         self.stage()
         self.settings.iterations = 100_000
+        self.enterContext(mock.patch.dict(os.environ, XDG_CACHE_HOME=str(self.dir / "cache")))
 
     def stop_when(self, condition):
         """Render until `condition(run)` holds, then press Esc. Returns the seconds from then to the end."""
@@ -319,7 +321,7 @@ class Stops(Installed):
         with mock.patch.object(engine.run, "Run", watched), mock.patch.object(engine.Engine, "_is_cancelled", esc):
             found = self.render()
         self.assertFalse(runs and runs[-1].is_running())
-        self.assertIsNotNone(runs[-1]._process.wait(10) if runs else 0)
+        self.assertIsNotNone(runs[-1]._process.wait(60) if runs else 0)
         return found, time.monotonic() - pressed[0]
 
     def test_in_the_middle_the_picture_so_far_is_kept(self):
@@ -338,7 +340,7 @@ class Stops(Installed):
         engine, run = part_of_addon("engine").Engine, part_of_addon("run").Run
         show, stop, finish = engine._show, run.stop, run.finish
         with mock.patch.object(engine, "_show", lambda *picture: shown.append(show(*picture))), \
-                mock.patch.object(run, "stop", lambda work: (pressed.append(time.monotonic()), stop(work))), \
+                mock.patch.object(run, "stop", lambda work, *saved: (pressed.append(time.monotonic()), stop(work, *saved))), \
                 mock.patch.object(run, "finish", lambda work: (ended.append(time.monotonic()), finish(work))):
             found, _ = self.stop_when(lambda run: shown)
         self.assertLess(ended[0] - pressed[0], 2)
@@ -347,7 +349,6 @@ class Stops(Installed):
 
     def test_a_killed_render_goes_on(self):
         """As if Blender were killed: its program goes on alone. The next render ends it, and starts from its checkpoint."""
-        self.enterContext(mock.patch.dict(os.environ, XDG_CACHE_HOME=str(self.dir / "cache")))
         resume, run = part_of_addon("resume"), part_of_addon("run")
         self.enterContext(mock.patch.object(resume, "_SECONDS_BETWEEN", 1))
         saved, before = [], [0, 0]
@@ -380,8 +381,50 @@ class Stops(Installed):
         # The last look but one was before the checkpoint, which therefore has at least the iterations until then.
         self.assertGreaterEqual(first[0], before[-2])
         self.assertGreater(first[0], 1)
-        saved[0]._process.wait(10)
-        self.assertEqual(os.listdir(resume._folder()), [])
+        saved[0]._process.wait(60)
+
+    def test_a_stopped_render_continues(self):
+        resume, session = part_of_addon("resume"), part_of_addon("session")
+
+        def checkpoints():
+            return [name for name in os.listdir(resume._folder()) if name.endswith(".checkpoint")]
+
+        self.settings.finish = "off"
+        self.stop_when(lambda run: run and run.progress and run.progress["iteration"] >= 5)
+        done = session.stopped[self.scene.name]
+        self.assertGreaterEqual(done, 5)
+        self.assertEqual(len(checkpoints()), 1)
+        first = []
+
+        def seen(run):
+            if run and run.progress:
+                first.append(run.progress["iteration"])
+            return bool(first)
+
+        self.stop_when(seen)
+        self.assertGreater(first[0], done, "it continues")
+        self.assertEqual(len(checkpoints()), 1)
+
+        # Another number of iterations is another render; its picture is that of a render that was never stopped.
+        self.settings.iterations = 40
+        self.stop_when(lambda run: run and run.progress and run.progress["iteration"] >= 3)
+        continued = self.render()
+        self.assertNotIn(self.scene.name, session.stopped)
+        self.assertEqual(len(checkpoints()), 1, "a finished render leaves no checkpoint")
+        whole = self.render()
+        for name, pixels in whole.items():
+            self.assertTrue(numpy.array_equal(pixels, continued[name]), name)
+
+    def test_few_checkpoints_are_kept(self):
+        resume = part_of_addon("resume")
+        folder = pathlib.Path(resume._folder())
+        folder.mkdir(parents=True)
+        for age in range(5):
+            file = folder / f"{age}.checkpoint"
+            file.write_bytes(b"")
+            os.utime(file, (time.time() - 60 * age,) * 2)
+        resume._remove_old(str(folder / "4.checkpoint"))
+        self.assertEqual(sorted(path.name[0] for path in folder.iterdir()), ["0", "1", "4"])
 
     def test_during_the_export(self):
         _, seconds = self.stop_when(lambda run: not run)

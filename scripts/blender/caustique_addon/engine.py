@@ -107,11 +107,13 @@ class Engine(bpy.types.RenderEngine):
         work = run.Run(words, folder)
         try:
             saved.started(work.process_id)
-            self._watch(work, preview, view_layer.name, part)
+            stopped = self._watch(work, saved, preview, view_layer.name, part)
             work.finish()
+            if stopped and work.progress is not None:
+                session.stopped[scene.name] = work.progress["iteration"]
         finally:
             work.kill()
-            saved.remove()
+            saved.end()
         self._warn(scene, work.warnings)
         if not os.path.isfile(output):  # stopped before the first iteration
             raise Cancelled()
@@ -121,16 +123,18 @@ class Engine(bpy.types.RenderEngine):
         """Whether the user has pressed Esc."""
         return self.test_break()
 
-    def _watch(self, work, preview, layer, part):
-        """Show the program's progress and its picture so far until it ends."""
-        said, shown = None, None
+    def _watch(self, work, saved, preview, layer, part):
+        """Show the program's progress and its picture so far until it ends. Returns whether the user has stopped it."""
+        said, shown, cancelled = None, None, False
+        begins = "Continuing the stopped render" if saved.exists() else "Rendering the first iteration"
         while work.is_running():
             cancelled = self._is_cancelled()
             if cancelled:
-                work.stop()
+                saved.stopped()
+                work.stop(saved.is_saved)
                 text = "Stopping"
             elif work.progress is None:
-                text = "Rendering the first iteration"
+                text = begins
             else:
                 text = run.sentence(work.progress)
                 self.update_progress(run.fraction(work.progress))
@@ -142,6 +146,7 @@ class Engine(bpy.types.RenderEngine):
                 shown = written
                 self._show(exr.Picture(preview), layer, part)
             time.sleep(_POLL_SECONDS)
+        return cancelled
 
     @contextlib.contextmanager
     def _result(self, layer, part):
@@ -196,6 +201,7 @@ def _forget(scene, *_):
     """Clear the messages of the previous render when a new one begins, which may have many frames."""
     session.warnings.pop(scene.name, None)
     session.faults.pop(scene.name, None)
+    session.stopped.pop(scene.name, None)
 
 
 def register():

@@ -42,6 +42,11 @@ class StopPanel(Panel, bpy.types.Panel):
             value.prop(settings, name, text="")
         if not any(getattr(settings, f"use_{name}") for name in _STOPS):
             text_layout.draw(column, context, "Nothing is chosen: a render stops after 64 iterations", "INFO")
+        done = session.stopped.get(context.scene.name)
+        if done is not None:
+            text_layout.draw(column, context, f"The last render was stopped after {done} iterations. F12 continues it if scene "
+                                              "and settings are as they were", "INFO")
+            self.layout.operator("render.render", text="Continue Render", icon="PLAY")
 
 
 class EffectsPanel(Panel, bpy.types.Panel):

@@ -8,7 +8,9 @@ import time
 
 from . import fault, handoff
 
+_POLL_SECONDS = 0.05  # between two looks for the saved state
 _INTERRUPTED = 130  # exit code of a program that was interrupted and has written its picture
+_SAVE_SECONDS = 20.0  # from the interrupt to killing the program, which saves its state meanwhile
 _GRACE_SECONDS = 1.0  # from the interrupt to ending the program, whose last picture is on the screen
 
 
@@ -55,21 +57,29 @@ class Run:
         """Whether the program is running."""
         return not self._ended and self._process.poll() is None
 
-    def stop(self):
-        """Interrupt the program, which then writes its picture; end it after a grace period. Call this repeatedly."""
+    def stop(self, is_saved=lambda: True):
+        """Interrupt the program, which then saves its state and writes its picture; leave it after a grace period, and kill it
+        when `is_saved()` holds. Call this repeatedly."""
         now = time.monotonic()
         if self._interrupted_at is None:
             self._interrupted_at = now
             self._process.send_signal(signal.SIGINT)
         elif now - self._interrupted_at > _GRACE_SECONDS:
             self._ended = True
-            self._process.kill()
-            threading.Thread(target=self._process.wait, daemon=True).start()
+            threading.Thread(target=self._end, args=(is_saved,), daemon=True).start()
+
+    def _end(self, is_saved):
+        """Kill the program when it has saved its state, while the user goes on."""
+        end = self._interrupted_at + _SAVE_SECONDS
+        while self._process.poll() is None and not is_saved() and time.monotonic() < end:
+            time.sleep(_POLL_SECONDS)
+        self._process.kill()
+        self._process.wait()
 
     def kill(self):
-        """Kill the program if it is running."""
-        self._process.kill()
-        if not self._ended:  # otherwise nobody waits while the system frees its memory
+        """Kill the program if it is running and has not been left to save its state."""
+        if not self._ended:
+            self._process.kill()
             self._process.wait()
             self._listener.join()
 

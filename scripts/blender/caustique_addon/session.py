@@ -6,12 +6,16 @@ warnings = {}
 #: {scene's name: fault that ended its last render}
 faults = {}
 
+#: {scene's name: iterations of its last render, which the user has stopped}
+stopped = {}
+
 #: {scene's name: its last `diagnosis.Plan`}
 plans = {}
 
 
 def clear():
-    """Clear the warnings, faults and plans of all scenes, which the add-on's panels show."""
+    """Clear what the add-on's panels show of all scenes."""
     warnings.clear()
     faults.clear()
     plans.clear()
+    stopped.clear()
