@@ -6,6 +6,7 @@ use super::statistical;
 use crate::error::{Error, ErrorKind, Result};
 use crate::film::Picture;
 use crate::installed;
+use crate::stop::Stop;
 use caustique_oidn as oidn;
 use serde::{Deserialize, Serialize};
 
@@ -82,8 +83,9 @@ impl Denoiser {
     /// The denoised picture of an estimate; the estimate itself with [`Denoiser::None`].
     ///
     /// # Errors
-    /// [`ErrorKind::Library`]: Open Image Denoise fails.
-    pub fn run(&mut self, estimate: &Estimate, quality: Quality) -> Result<Picture> {
+    /// [`ErrorKind::Library`]: Open Image Denoise fails. [`ErrorKind::Interrupted`]: `stop` was requested meanwhile, which
+    /// only Open Image Denoise heeds.
+    pub fn run(&mut self, estimate: &Estimate, quality: Quality, stop: Option<&Stop>) -> Result<Picture> {
         let Estimate { mean, albedo, normal, .. } = estimate;
         let (albedo, normal) = (albedo.as_ref(), normal.as_ref());
         match self {
@@ -102,8 +104,13 @@ impl Denoiser {
                 input.normal = normal.filter(|_| albedo.is_some()).map(|normal| &**normal);
                 (input.hdr, input.clean_aux) = (true, albedo.is_some());
                 (input.quality, input.max_memory_mib) = (quality, Some(MAX_MEMORY_MIB));
-                let pixels = filter.denoise(&input);
+                let pixels = match stop {
+                    Some(stop) => filter.denoise_while(&input, &|| !stop.requested()),
+                    None => filter.denoise(&input).map(Some),
+                };
                 let pixels = pixels.map_err(|error| Error::new(ErrorKind::Library, "Open Image Denoise", error))?;
+                let interrupted = || Error::new(ErrorKind::Interrupted, "", "interrupted while it was denoised");
+                let pixels = pixels.ok_or_else(interrupted)?;
                 Ok(Picture::new(size, pixels))
             }
         }

@@ -35,6 +35,7 @@ use crate::film::kind::Use;
 use crate::film::{
     CAUSTIC, LIGHT_GROUP, LOBE_COLORS, Layer, LayerSet, Picture, Size, finished_part, kind_of, lobe_names, part_names,
 };
+use crate::stop::Stop;
 use bound::Noise;
 use estimate::{alpha, estimate_layers, own_level};
 use finished_error::ErrorEstimator;
@@ -70,6 +71,8 @@ pub struct Finish {
     denoiser: Denoiser,
     /// Quality of Open Image Denoise.
     pub quality: Quality,
+    /// Ends a run of Open Image Denoise early, which is an error then; `None`: each run goes to its end.
+    pub stop: Option<Stop>,
     network: Option<Combiner>,
 }
 
@@ -224,7 +227,7 @@ fn part_layers(set: &LayerSet) -> impl Iterator<Item = &Layer> {
 impl Finish {
     /// A finish by a denoiser, and by the network that combines bandwidth levels with equation (6), if there is one.
     pub fn new(denoiser: Denoiser, network: Option<Combiner>) -> Finish {
-        Finish { denoiser, quality: Quality::High, network }
+        Finish { denoiser, quality: Quality::High, stop: None, network }
     }
 
     /// Name of the denoiser, with the version of Open Image Denoise.
@@ -263,7 +266,7 @@ impl Finish {
     /// The finished picture and the [spread](bound::spread) that limits its displacement, and the numbers of clamped
     /// pixels.
     fn with_spread(&mut self, estimate: &Estimate) -> Result<([Picture; 2], Clamped)> {
-        let denoised = self.denoiser.run(estimate, self.quality)?;
+        let denoised = self.denoiser.run(estimate, self.quality, self.stop.as_ref())?;
         Ok(displaced(estimate, &denoised))
     }
 
@@ -283,7 +286,7 @@ impl Finish {
     /// Layers are missing ([`Estimate::of`]), or the denoiser or the network fails; the set is unchanged then.
     pub fn apply(&mut self, set: &mut LayerSet, wanted: impl Fn(&str) -> bool) -> Result<Finished> {
         let (estimate, combined) = self.estimate(set)?;
-        let denoised = self.denoiser.run(&estimate, self.quality)?;
+        let denoised = self.denoiser.run(&estimate, self.quality, self.stop.as_ref())?;
         let half = quarters(set).map(|quarters| self.picture(&estimate.first_half(&quarters))).transpose()?;
         let names = parts_to_finish(set, &wanted);
         let parts = names.into_iter().filter_map(|name| set.picture(&name).map(|picture| (name, picture))).collect();
@@ -316,10 +319,10 @@ impl Finish {
         if let Some(quarters) = quarters {
             let of_half = estimate.first_half(&quarters);
             drop(quarters);
-            let denoised = self.denoiser.run(&of_half, self.quality)?;
+            let denoised = self.denoiser.run(&of_half, self.quality, self.stop.as_ref())?;
             half = Some([of_half.mean, denoised]);
         }
-        let denoised = self.denoiser.run(&estimate, self.quality)?;
+        let denoised = self.denoiser.run(&estimate, self.quality, self.stop.as_ref())?;
         let is_denoised = !matches!(self.denoiser, Denoiser::None);
         let pictures = temporal::Pictures { estimate, denoised, half, combined, is_denoised };
         Ok(temporal::Frame::new(pictures, parts, motion, correlation))
@@ -425,7 +428,7 @@ impl Finish {
                 of_part.mean.clone()
             } else {
                 // Parts are looked at less closely than the picture.
-                self.denoiser.run(&of_part, Quality::Fast)?
+                self.denoiser.run(&of_part, Quality::Fast, self.stop.as_ref())?
             };
             names.push(name);
             estimates.push(Part { mean: std::mem::take(&mut of_part.mean), denoised });

@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::film::{LayerSet, Size};
 use crate::finish::{Denoiser, DenoiserChoice, Finish, Finished, Quality};
 use crate::render::Clock;
+use crate::stop::Stop;
 use serde_json::{Value, json};
 
 /// Largest share of the render's time limit that one run of the denoiser may take at a quality above the lowest.
@@ -110,11 +111,13 @@ impl OpenFinish {
     /// Finishes a preview: at the lowest quality, without its error and its parts.
     ///
     /// # Errors
-    /// See [`Finish::apply`].
-    pub fn apply_to_preview(&mut self, set: &mut LayerSet) -> Result<()> {
+    /// See [`Finish::apply`]. [`ErrorKind::Interrupted`](crate::error::ErrorKind::Interrupted): `stop` was requested
+    /// meanwhile.
+    pub fn apply_to_preview(&mut self, set: &mut LayerSet, stop: Option<&Stop>) -> Result<()> {
         let quality = std::mem::replace(&mut self.finish.quality, Quality::Fast);
+        self.finish.stop = stop.cloned();
         let applied = self.finish.apply(set, |_| false);
-        self.finish.quality = quality;
+        (self.finish.quality, self.finish.stop) = (quality, None);
         applied.map(|_| ())
     }
 

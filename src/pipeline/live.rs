@@ -18,7 +18,10 @@ use crate::render::{Candidate, Control, Progress, RenderInput, Session, Settings
 use crate::scene::View;
 use crate::stop::Stop;
 use std::path::Path;
+use std::time::Duration;
 
+/// Time after a coarse picture in which the next view may come before the whole picture begins.
+const NEXT_VIEW_MILLISECONDS: u64 = 20;
 /// Fewest light paths of an iteration of the coarse picture.
 const MIN_COARSE_PHOTONS: u32 = 1000;
 
@@ -94,7 +97,8 @@ pub fn render_live(
         let camera = checked.camera.downscale(1.0 / f64::from(request.coarse));
         let share = request.coarse.saturating_mul(request.coarse);
         let photons = (settings.photons / share).max(MIN_COARSE_PHOTONS).min(settings.photons);
-        let settings = fit(Settings { photons, iterations: Some(1), ..settings.clone() })?;
+        // Learning where light paths start takes longer than the coarse picture.
+        let settings = fit(Settings { photons, iterations: Some(1), guided: false, ..settings.clone() })?;
         let input = RenderInput::new(scene, &camera, &settings);
         let (progress, reason, failure) = run(&input, finish.as_deref_mut(), true, show)?;
         if let Some(failure) = failure {
@@ -103,6 +107,7 @@ pub fn render_live(
         if reason == StopReason::Interrupted {
             return Ok(LiveEnd { progress, reason, candidate: request.candidate });
         }
+        wait_for_next(&request.stop);
     }
     let chosen = known.unwrap_or_else(|| choose(method, checked.settings, view, |_| true, || request.stop.requested()));
     if request.stop.requested() {
@@ -114,6 +119,17 @@ pub fn render_live(
     let input = RenderInput::new(scene, &checked.camera, &settings);
     let (progress, reason, failure) = run(&input, finish, false, show)?;
     failure.map_or(Ok(LiveEnd { progress, reason, candidate }), Err)
+}
+
+/// Waits a moment for a request to stop: while a camera moves, the next view comes as soon as the coarse picture of the last
+/// one is there, and the memory of the whole picture would be taken for nothing.
+fn wait_for_next(stop: &Stop) {
+    for _ in 0..NEXT_VIEW_MILLISECONDS {
+        if stop.requested() {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
 }
 
 /// Renders the iterations of a picture, and shows it after the iterations 1, 2, 4 and so on, and after the last one.
@@ -135,10 +151,10 @@ fn run(
             return Control::Continue;
         }
         next = 2 * progress.iteration;
-        let set = match picture(session, finish.as_deref_mut()) {
+        let set = match picture(session, finish.as_deref_mut(), &settings.stop) {
             Ok(set) => set,
             Err(error) => {
-                failure = Some(error);
+                failure = Some(error).filter(|error| error.kind != ErrorKind::Interrupted);
                 return Control::Stop;
             }
         };
@@ -147,12 +163,12 @@ fn run(
     Ok((last, reason, failure.or(session.take_failure())))
 }
 
-/// The picture so far, finished as a preview: the beauty layer alone.
-fn picture(session: &Session<'_>, finish: Option<&mut OpenFinish>) -> Result<LayerSet> {
+/// The picture so far, finished as a preview unless `stop` ends that: the beauty layer alone.
+fn picture(session: &Session<'_>, finish: Option<&mut OpenFinish>, stop: &Stop) -> Result<LayerSet> {
     let finishes = finish.is_some();
     let mut set = session.layers(|name| name.is_empty() || (finishes && reads_for_picture(name)))?;
     if let Some(finish) = finish {
-        finish.apply_to_preview(&mut set)?;
+        finish.apply_to_preview(&mut set, Some(stop))?;
     }
     set.layers.retain(|layer| layer.name.is_empty());
     Ok(set)

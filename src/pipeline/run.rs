@@ -156,7 +156,7 @@ impl BetweenIterations<'_> {
             let wanted = |name: &str| name.is_empty() || (finish.is_some() && reads_for_picture(name));
             let picture = session.layers(wanted).and_then(|mut set| {
                 if let Some(finish) = finish {
-                    finish.apply_to_preview(&mut set)?;
+                    finish.apply_to_preview(&mut set, None)?;
                 }
                 set.layers.retain(|layer| layer.name.is_empty());
                 Ok(set)

@@ -70,7 +70,7 @@ impl PeerDenoiser {
             alpha: None,
         };
         let mut spent = TimeSpent::default();
-        let denoised = spent.measure(|| self.denoiser.run(&estimate, Quality::High))?;
+        let denoised = spent.measure(|| self.denoiser.run(&estimate, Quality::High, None))?;
         Ok((denoised, spent))
     }
 }

@@ -5,6 +5,10 @@ use std::ffi::{c_char, c_int, c_void};
 /// A device or a filter of Open Image Denoise: an opaque pointer, null on failure.
 pub type Handle = *mut c_void;
 
+/// Function that the library calls while a filter works, with a user's pointer and the work done from 0 to 1; the filter
+/// ends early if it returns false. The library calls it from any of its threads, one call at a time.
+pub type Monitor = unsafe extern "C" fn(*mut c_void, f64) -> bool;
+
 /// Open Image Denoise's device type of the CPU.
 pub const DEVICE_TYPE_CPU: c_int = 1;
 
@@ -67,6 +71,8 @@ functions! {
         unset_image = b"oidnUnsetFilterImage\0" (Handle, *const c_char);
         set_filter_bool = b"oidnSetFilterBool\0" (Handle, *const c_char, bool);
         set_filter_int = b"oidnSetFilterInt\0" (Handle, *const c_char, c_int);
+        // Filter, function (null for none), the user's pointer.
+        set_monitor = b"oidnSetFilterProgressMonitorFunction\0" (Handle, Option<Monitor>, *mut c_void);
         commit_filter = b"oidnCommitFilter\0" (Handle);
         execute_filter = b"oidnExecuteFilter\0" (Handle);
     }

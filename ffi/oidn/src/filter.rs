@@ -1,6 +1,8 @@
 //! Denoising of pictures by a filter, which holds the network.
 
 use std::ffi::{CStr, c_int, c_void};
+use std::ptr;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::api::{self, Handle};
 use crate::device::Device;
@@ -90,6 +92,23 @@ pub struct Filter {
 // SAFETY: filters belong to their device, not to a thread, and are used only through `&mut`.
 unsafe impl Send for Filter {}
 
+/// A function that is polled while a picture is denoised, and whether it has ended the work.
+struct Poll<'a> {
+    goes_on: &'a (dyn Fn() -> bool + Sync),
+    ended: AtomicBool,
+}
+
+/// Polls the [`Poll`] that `poll` points to, for the library.
+unsafe extern "C" fn goes_on(poll: *mut c_void, _done: f64) -> bool {
+    // SAFETY: `Filter::execute` passes a pointer to a `Poll` that outlives the execution; its function is `Sync`.
+    let poll = unsafe { &*poll.cast::<Poll<'_>>() };
+    let goes_on = (poll.goes_on)();
+    if !goes_on {
+        poll.ended.store(true, Ordering::Relaxed);
+    }
+    goes_on
+}
+
 impl Filter {
     pub(crate) fn new(device: &Device) -> Result<Filter, Error> {
         let during = "make a filter";
@@ -108,6 +127,27 @@ impl Filter {
     /// [`Error::BadSize`], [`Error::BadLength`] and [`Error::NormalWithoutAlbedo`], before the library is called;
     /// [`Error::Oidn`] with the library's message, for instance if memory is short. The filter stays usable.
     pub fn denoise(&mut self, input: &Input) -> Result<Vec<[f32; 3]>, Error> {
+        self.execute(input, None)
+    }
+
+    /// Denoises a picture, or ends early with the result `None` once `goes_on` returns false. Threads of the library poll
+    /// it, one at a time, whenever a layer of the network is done.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Filter::denoise`].
+    pub fn denoise_while(
+        &mut self,
+        input: &Input,
+        goes_on: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Option<Vec<[f32; 3]>>, Error> {
+        let poll = Poll { goes_on, ended: AtomicBool::new(false) };
+        let denoised = self.execute(input, Some(&poll));
+        // The library reports the end as an error.
+        if poll.ended.into_inner() { Ok(None) } else { denoised.map(Some) }
+    }
+
+    fn execute(&mut self, input: &Input, poll: Option<&Poll>) -> Result<Vec<[f32; 3]>, Error> {
         input.check()?;
         let mut output = Vec::new();
         output.try_reserve_exact(input.color.len()).map_err(|error| Error::Oidn {
@@ -137,9 +177,18 @@ impl Filter {
         // SAFETY: the handle is a filter, and its pictures have the sizes that were set (checked above).
         unsafe { (functions.commit_filter)(self.raw) };
         self.device.check("prepare to denoise")?;
+        if let Some(poll) = poll {
+            // SAFETY: the handle is a filter. The library calls the function only while it executes the filter, below,
+            // and `poll` outlives that.
+            unsafe { (functions.set_monitor)(self.raw, Some(goes_on), ptr::from_ref(poll).cast_mut().cast()) };
+        }
         // SAFETY: as above. Inputs and output are borrowed or owned here until the call returns, after the output is
         // written. They do not overlap, and inputs are only read.
         unsafe { (functions.execute_filter)(self.raw) };
+        if poll.is_some() {
+            // SAFETY: the handle is a filter.
+            unsafe { (functions.set_monitor)(self.raw, None, ptr::null_mut()) };
+        }
         self.device.check("denoise")?;
         Ok(output)
     }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use caustique_oidn::{Device, Error, Folders, Input, Library, MAX_SIDE, MAX_THREADS, Quality, Version};
 
@@ -246,6 +247,28 @@ fn sizes_and_lengths_are_checked() {
     assert_eq!(refused(&Input { normal: Some(&pixels), ..right }), "normals guide only together with albedo");
     assert_eq!(Error::NormalWithoutAlbedo.hint().as_deref(), Some("give albedo, too, or leave normals out"));
     assert!(filter.denoise(&right).is_ok(), "the filter stays usable");
+}
+
+/// A run that is ended has no picture, and takes a small part of the time; the filter denoises as before afterwards.
+#[test]
+fn a_run_that_is_ended_has_no_picture_and_leaves_the_filter_usable() {
+    let (width, height) = (320, 240);
+    let pixels = noise(width * height, 22);
+    let input = Input::new(width, height, &pixels);
+    let mut filter = device(2).filter().unwrap();
+    let whole = filter.denoise(&input).unwrap();
+    let polls = AtomicUsize::new(0);
+    let counted = filter.denoise_while(&input, &|| polls.fetch_add(1, Ordering::Relaxed) < usize::MAX).unwrap();
+    assert!(counted.as_ref() == Some(&whole), "polling changes nothing");
+    let all = polls.load(Ordering::Relaxed);
+    assert!(all > 10, "{all} polls are few");
+    for last in [0, all / 2] {
+        polls.store(0, Ordering::Relaxed);
+        let ended = filter.denoise_while(&input, &|| polls.fetch_add(1, Ordering::Relaxed) < last).unwrap();
+        assert!(ended.is_none());
+        assert!(polls.load(Ordering::Relaxed) <= last + 2, "it works on after its end");
+        assert!(filter.denoise(&input).unwrap() == whole, "the filter stays usable");
+    }
 }
 
 #[test]

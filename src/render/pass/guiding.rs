@@ -77,6 +77,10 @@ pub(super) fn learn_guide(
         ((f64::from(settings.photons) * LIGHT_PATHS_RATIO) as u32).clamp(MIN_LIGHT_PATHS, MAX_LIGHT_PATHS);
     let mut guide = Guide::new(&camera_paths.scene.lights, camera_paths.indirect == Indirect::Photons)?;
     for round in 0..ROUNDS {
+        if settings.stop.requested() {
+            // The first iteration is aborted, too.
+            return None;
+        }
         let (maps, walked) =
             trace_photons(camera_paths, initial_media, &Round { seed, index: round, light_paths, region }, &guide);
         let error = estimate_error(camera_paths, seed, round, &maps, guide.cells());
