@@ -154,14 +154,13 @@ def measure(scene, budget, reference, names):
 
 def draw(scene, budget, last, reference):
     """Writes the page of a scene: pictures, and the first and last shares of each network's weights."""
-    name = references.name(scene).replace("/", "-")
-    shares = {}
+    stem, shares = references.name(scene).replace("/", "-"), {}
     for name, made in last.items():
         numbers = sorted(made.shares, key=lambda share: int(share.removeprefix("Share")))
         shares |= {f"{name} {number}": made.shares[number] for number in dict.fromkeys(numbers[:1] + numbers[-1:])}
-    file = ROOT / "out" / "combiner" / f"{name}-{budget:g}.png"
+    file = ROOT / "out" / "combiner" / f"{stem}-{budget:g}.png"
     if budget == max(options.budgets):
-        file = ROOT / "docs" / "lab" / "combiner" / f"{name}.jpg"
+        file = ROOT / "docs" / "lab" / "combiner" / f"{stem}.jpg"
     page(file, {name: made.picture for name, made in last.items()}, shares, reference.mean)
     print(f"    {file}")
 
