@@ -63,4 +63,9 @@ def cost(figures):
     return table(["finish of 1280x720 pixels", "seconds", "core-seconds", "peak memory, MiB"], rows)
 
 
-KINDS = {}
+KINDS = {
+    "combiner-training": training,
+    "combiner": equal_time,
+    "combiner-paper": paper,
+    "combiner-cost": cost,
+}
