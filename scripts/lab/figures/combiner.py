@@ -56,17 +56,28 @@ def layers(scene):
     return ",".join([*always, *note["parts"], *note["radii"]])
 
 
-def combine(scene, run, picture, independent=None):
-    """A network's combination of a picture, from the cache if possible; returns the file and the core-seconds."""
-    checkpoint = options.folder / "runs" / run / "last.pt"
-    folder = picture / f"{run}-{digest(checkpoint)}{'-' + digest(independent) if independent else ''}"
+def made_from(picture, name, line):
+    """The picture that a command makes of a render, given the file to write; from the cache under `name` if possible.
+    Returns the file and the core-seconds."""
+    folder = picture / name
     if not folder.exists():
         with create(folder) as draft:
-            words = ["--checkpoint", checkpoint, "--scene", scene, picture / "picture.exr", "-o", draft / "picture.exr"]
-            words += ["--independent", independent] if independent else []
-            _, _, spent = run_timed([installed(".venv-train"), "-m", "lab.train.apply", *words])
+            _, _, spent = run_timed(line(draft / "picture.exr"))
             save(draft / "run.json", {"core_seconds": spent})
     return folder / "picture.exr", load(folder / "run.json")["core_seconds"]
+
+
+def combine(scene, run, picture, independent=None):
+    """A network's combination of a picture; returns the file and the core-seconds."""
+    checkpoint = options.folder / "runs" / run / "last.pt"
+
+    def line(out):
+        words = ["--checkpoint", checkpoint, "--scene", scene, picture / "picture.exr", "-o", out]
+        words += ["--independent", independent] if independent else []
+        return [installed(".venv-train"), "-m", "lab.train.apply", *words]
+
+    name = f"{run}-{digest(checkpoint)}{'-' + digest(independent) if independent else ''}"
+    return made_from(picture, name, line)
 
 
 class Made(NamedTuple):
@@ -108,14 +119,9 @@ def bundled(names):
 
     def make(scene, budget, seed):
         picture = render(scene, "sppm", "none", budget, seed, "--levels", "5", "--eye-paths", "2", "--layers", names)
-        folder = picture / "bundled"
-        if not folder.exists():
-            with create(folder) as draft:
-                settings = {"model": "compact", "denoise": "none"}
-                line = command("finish", picture / "picture.exr", "-o", draft / "picture.exr", **settings)
-                _, _, spent = run_timed(line)
-                save(draft / "run.json", {"core_seconds": spent})
-        return Made(Layers(folder / "picture.exr").get(""), {}, load(folder / "run.json")["core_seconds"])
+        line = lambda out: command("finish", picture / "picture.exr", "-o", out, model="compact", denoise="none")
+        file, seconds = made_from(picture, "bundled", line)
+        return Made(Layers(file).get(""), {}, seconds)
 
     return make
 

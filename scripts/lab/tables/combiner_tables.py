@@ -42,16 +42,15 @@ def all_rows(cells):
 
 def paper(figures):
     """Table of the relMSE by scene and budget, beside the gains that the 2021 paper reports."""
-    names = ("levels-only", "paper", "deep-multi", "path, OIDN", "sppm, finished")
-    rows = []
+    networks, others, rows = ("levels-only", "paper", "deep-multi"), ("path, OIDN", "sppm, finished"), []
     for cell in figures.one("combiner")["cells"]:
         errors = {name: of["relmse_trimmed"] for name, of in cell["rows"].items()}
-        best = min((name for name in errors if name not in ("sppm", *names[3:])), key=errors.get)
-        ratios = [errors[name] / errors["sppm"] if name in errors else None for name in names]
+        best = min((name for name in errors if name not in ("sppm", *others)), key=errors.get)
+        ratios = [errors[name] / errors["sppm"] if name in errors else None for name in networks + others]
         before, after = cell["paper"]
         found = [f"`{cell['scene']}`", f"{cell['budget']:g}", digits(errors["sppm"]), *map(digits, ratios)]
         rows.append([*found, f"{digits(errors[best] / errors['sppm'])} (`{best}`)", f"{after / before:.2f}"])
-    head = ["scene", "core-s", "`sppm`", *(f"`{name}`" for name in names), "best network", "reported gain"]
+    head = ["scene", "core-s", "`sppm`", *(f"`{name}`" for name in networks + others), "best network", "reported gain"]
     return table(head, rows)
 
 
