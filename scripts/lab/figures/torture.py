@@ -128,12 +128,16 @@ def by_cycles(seed, behind=None):
 
 def backdrop(stage):
     """Cycles' picture of the stage without its body: the photograph behind a picture with a transparent film."""
-    render, floor = stage.scene.render, stage.floor
-    stage.body.hide_render, render.film_transparent, floor.is_shadow_catcher = True, False, False
+    empty = [(stage.body, "hide_render", True), (stage.scene.render, "film_transparent", False)]
+    empty.append((stage.floor, "is_shadow_catcher", False))
+    before = [getattr(thing, name) for thing, name, _ in empty]
+    for thing, name, value in empty:
+        setattr(thing, name, value)
     try:
         return by_cycles(3)
     finally:
-        stage.body.hide_render, render.film_transparent, floor.is_shadow_catcher = False, True, True
+        for (thing, name, _), value in zip(empty, before):
+            setattr(thing, name, value)
 
 
 def by_caustique(scene, seed, behind=None):
