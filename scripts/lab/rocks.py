@@ -27,6 +27,14 @@ def material(name, **inputs):
     return made
 
 
+def put(name, data, at, turn=(0, 0, 0)):
+    """An object of the open scene."""
+    thing = bpy.data.objects.new(name, data)
+    bpy.context.scene.collection.objects.link(thing)
+    thing.location, thing.rotation_euler = at, turn
+    return thing
+
+
 def _kind(index, random):
     """The material of every tenth rock: of ten, two are glass, two are metal, and the others are rough."""
     color = (*random.uniform(0.2, 0.8, 3), 1)
@@ -60,13 +68,6 @@ def build(triangles, seed=1):
     """Builds the scene anew: ground, rocks, a sun, an area lamp, a sky and a camera; returns its exact triangles."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene, random = bpy.context.scene, np.random.default_rng(seed)
-
-    def put(name, data, at, turn=(0, 0, 0)):
-        thing = bpy.data.objects.new(name, data)
-        scene.collection.objects.link(thing)
-        thing.location, thing.rotation_euler = at, turn
-        return thing
-
     count = -(-triangles // ROCK)
     side = math.ceil(math.sqrt(count))
     form = bmesh.new()

@@ -14,6 +14,7 @@ import bpy  # First, because it brings the others.
 import bmesh
 import export
 
+from .. import rocks
 from ..options import options
 from ..record import record
 
@@ -24,13 +25,7 @@ OBJECTS, KINDS, SIDE = 1000, 10, 10
 
 def material(index):
     """A Principled material whose colour depends on the index, and which is glass if the index is odd."""
-    made = bpy.data.materials.new(f"kind {index}")
-    if bpy.app.version < (5, 0, 0):
-        made.use_nodes = True
-    shader = next(node for node in made.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-    shader.inputs["Base Color"].default_value = (0.2 + 0.05 * index, 0.5, 0.4, 1)
-    shader.inputs["Transmission Weight"].default_value = index % 2
-    return made
+    return rocks.material(f"kind {index}", Base_Color=(0.2 + 0.05 * index, 0.5, 0.4, 1), Transmission_Weight=index % 2)
 
 
 def ball(material):
@@ -50,19 +45,12 @@ def build(meshes):
     """Builds a cube of balls that share `meshes` meshes, a camera and a sun; returns the number of triangles."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
-
-    def put(name, data, at, turn=(0, 0, 0)):
-        thing = bpy.data.objects.new(name, data)
-        scene.collection.objects.link(thing)
-        thing.location, thing.rotation_euler = at, turn
-        return thing
-
     kinds = [material(index) for index in range(KINDS)]
     shapes = [ball(kinds[index % KINDS]) for index in range(meshes)]
     for i in range(OBJECTS):
-        put(f"ball {i}", shapes[i % meshes], (i % SIDE, i // SIDE % SIDE, i // SIDE**2))
-    scene.camera = put("eye", bpy.data.cameras.new("eye"), (5, -20, 5), (math.pi / 2, 0, 0))
-    put("sun", bpy.data.lights.new("sun", "SUN"), (0, 0, 20))
+        rocks.put(f"ball {i}", shapes[i % meshes], (i % SIDE, i // SIDE % SIDE, i // SIDE**2))
+    scene.camera = rocks.put("eye", bpy.data.cameras.new("eye"), (5, -20, 5), (math.pi / 2, 0, 0))
+    rocks.put("sun", bpy.data.lights.new("sun", "SUN"), (0, 0, 20))
     return sum(len(thing.data.polygons) for thing in scene.objects if thing.type == "MESH")
 
 
