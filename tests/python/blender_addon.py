@@ -324,6 +324,18 @@ class Stops(Installed):
         self.assertIsNotNone(runs[-1]._process.wait(60) if runs else 0)
         return found, time.monotonic() - pressed[0]
 
+    def first_iteration(self):
+        """Render until the program tells an iteration, then press Esc. Returns the iteration's number."""
+        told = []
+
+        def tells(run):
+            if run and run.progress:
+                told.append(run.progress["iteration"])
+            return bool(told)
+
+        self.stop_when(tells)
+        return told[0]
+
     def test_in_the_middle_the_picture_so_far_is_kept(self):
         self.passes("use_pass_z", "noisy")
         found, seconds = self.stop_when(lambda run: run and run.progress and run.progress["iteration"] >= 3)
@@ -370,17 +382,10 @@ class Stops(Installed):
                 self.render()
             except (Killed, RuntimeError, FileNotFoundError):
                 pass
-        first = []
-
-        def seen(run):
-            if run and run.progress:
-                first.append(run.progress["iteration"])
-            return bool(first)
-
-        self.stop_when(seen)
+        first = self.first_iteration()
         # The last look but one was before the checkpoint, which therefore has at least the iterations until then.
-        self.assertGreaterEqual(first[0], before[-2])
-        self.assertGreater(first[0], 1)
+        self.assertGreaterEqual(first, before[-2])
+        self.assertGreater(first, 1)
         saved[0]._process.wait(60)
 
     def test_a_stopped_render_continues(self):
@@ -394,15 +399,8 @@ class Stops(Installed):
         done = session.stopped[self.scene.name]
         self.assertGreaterEqual(done, 5)
         self.assertEqual(len(checkpoints()), 1)
-        first = []
-
-        def seen(run):
-            if run and run.progress:
-                first.append(run.progress["iteration"])
-            return bool(first)
-
-        self.stop_when(seen)
-        self.assertGreater(first[0], done, "it continues")
+        first = self.first_iteration()
+        self.assertGreater(first, done, "it continues")
         self.assertEqual(len(checkpoints()), 1)
 
         # Another number of iterations is another render; its picture is that of a render that was never stopped.
