@@ -21,6 +21,7 @@ pub use weights::EffectWeight;
 use crate::camera::Camera;
 use crate::render::{Candidate, Clock, Cost, RenderInput, Session, Settings, TimeSpent};
 use crate::scene::{Scene, View};
+use crate::stop::Stop;
 use pilot::Pilot;
 
 /// Share of the time limit of a render after which the pilot ends. The clock matters on slow or busy machines only:
@@ -53,33 +54,25 @@ impl Choice {
 }
 
 /// Chooses the candidate with the smallest expected error. `settings_of` returns the settings of a candidate, `None` if
-/// the user's options exclude it. Once `stopped` returns true, the pilot ends as soon as it can, and the caller has to
-/// discard the choice.
-pub fn choose(
-    view: View<'_>,
-    settings_of: impl Fn(Candidate) -> Option<Settings>,
-    stopped: impl Fn() -> bool,
-) -> Option<Choice> {
+/// the user's options exclude it. If `stop` is requested, the pilot ends as soon as it can, and the caller has to discard
+/// the choice.
+pub fn choose(view: View<'_>, settings_of: impl Fn(Candidate) -> Option<Settings>, stop: &Stop) -> Option<Choice> {
     let mut spent = TimeSpent::default();
-    let choice = spent.measure(|| choose_untimed(view, &settings_of, &stopped));
+    let choice = spent.measure(|| choose_untimed(view, &settings_of, stop));
     choice.map(|choice| Choice { spent, ..choice })
 }
 
-fn choose_untimed(
-    view: View<'_>,
-    settings_of: &impl Fn(Candidate) -> Option<Settings>,
-    stopped: &dyn Fn() -> bool,
-) -> Option<Choice> {
+fn choose_untimed(view: View<'_>, settings_of: &impl Fn(Candidate) -> Option<Settings>, stop: &Stop) -> Option<Choice> {
     let gathering = settings_of(Candidate::GATHERING)?;
     let clock = Clock::start();
     let pilot = Pilot::new(view, &gathering);
     let limit = gathering.time.map(|seconds| MAX_PILOT_TIME_SHARE * seconds);
     let late = || limit.is_some_and(|limit| clock.seconds() > limit);
-    let (effects, effects_seconds) = if late() { (Vec::new(), 0.0) } else { pilot.weigh_effects() };
+    let (effects, effects_seconds) = if late() { (Vec::new(), 0.0) } else { pilot.weigh_effects(stop) };
     let (pilots, reason) = if late() {
         (Vec::new(), Some("the time for a pilot is over"))
     } else {
-        pilot.run(effects_seconds, settings_of, &|| stopped() || late())
+        pilot.run(effects_seconds, settings_of, stop, &late)
     };
     let chosen = pilots.iter().find(|pilot| pilot.chosen);
     let candidate = chosen.map_or_else(|| candidate_without_pilot(view.scene, settings_of), |chosen| chosen.candidate);

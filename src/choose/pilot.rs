@@ -6,6 +6,7 @@ use crate::camera::Camera;
 use crate::plan::{Effect, Presence};
 use crate::render::{Candidate, Cost, Counts, Method, Proxy, Settings};
 use crate::scene::{Scene, View};
+use crate::stop::Stop;
 
 /// Share of the render's work that the pilot (a proxy render in a small picture) and the measurement of effects may take
 /// together.
@@ -120,8 +121,9 @@ impl<'a> Pilot<'a> {
 
     /// Measures what each effect of the scene adds to the picture. Also returns the predicted core-seconds of the
     /// measurement. If the render is too short for all of it, measures light effects only, or nothing.
-    pub fn weigh_effects(&self) -> (Vec<WeighedEffect>, f64) {
+    pub fn weigh_effects(&self, stop: &Stop) -> (Vec<WeighedEffect>, f64) {
         let settings = weights::settings(self.gathering, EFFECTS_PHOTON_SHARE);
+        let settings = Settings { stop: stop.clone(), ..settings };
         let pixels = EFFECTS_PIXELS.min(self.pixels);
         let picture_seconds =
             self.cost.iteration_seconds(Candidate::GATHERING, &settings, pixels) * weights::ITERATIONS as f64;
@@ -141,7 +143,8 @@ impl<'a> Pilot<'a> {
         let small = self.view.camera.subsample((pixels / self.pixels).sqrt().min(1.0));
         let count = |scene: &Scene, camera: &Camera| Cost::count(scene, camera, self.gathering, None);
         let view = View::new(self.view.scene, &small);
-        (weights::weigh(view, &settings, &presence, &scene_effects, count), seconds)
+        let weighed = weights::weigh(view, &settings, &presence, &scene_effects, count).unwrap_or_default();
+        (weighed, seconds)
     }
 
     /// Estimates the noise of all candidates of `vcm` with the work that the measurement of effects (`effects_seconds`)
@@ -151,7 +154,8 @@ impl<'a> Pilot<'a> {
         &self,
         effects_seconds: f64,
         settings_of: &impl Fn(Candidate) -> Option<Settings>,
-        stopped: &dyn Fn() -> bool,
+        stop: &Stop,
+        late: &dyn Fn() -> bool,
     ) -> (Vec<PilotResult>, Option<&'static str>) {
         let scene = self.view.scene;
         let misses_light = !Method::Vcm.search().finds(Effect::Sds, &scene.survey);
@@ -170,17 +174,19 @@ impl<'a> Pilot<'a> {
         let Some(size) = self.size(&settings, effects_seconds) else {
             return (Vec::new(), Some("the render is too short to try others"));
         };
-        (chosen_and_usual(self.results(&size, guided, &settings, settings_of, stopped)), None)
+        let settings = Settings { stop: stop.clone(), ..settings };
+        (chosen_and_usual(self.results(&size, guided, &settings, settings_of, late)), None)
     }
 
-    /// Expected noise of all candidates with or without guided light paths, from one proxy render by `settings`.
+    /// Expected noise of all candidates with or without guided light paths, from one proxy render by `settings`; nothing
+    /// if the user stops it.
     fn results(
         &self,
         size: &PilotSize,
         guided: bool,
         settings: &Settings,
         settings_of: &impl Fn(Candidate) -> Option<Settings>,
-        stopped: &dyn Fn() -> bool,
+        late: &dyn Fn() -> bool,
     ) -> Vec<PilotResult> {
         let View { scene, camera } = self.view;
         let counts = all_counts();
@@ -197,7 +203,11 @@ impl<'a> Pilot<'a> {
         let guide = proxy.learn_guide();
         // Guided light paths are longer, because most of them meet glass.
         let guided_cost = guide.as_ref().map(|guide| Cost::count(scene, camera, self.gathering, Some(guide)));
-        let variances = proxy.measure(guide.as_ref(), size.iterations, stopped).relative();
+        let moments = proxy.measure(guide.as_ref(), size.iterations, late);
+        if settings.stop.requested() {
+            return Vec::new();
+        }
+        let variances = moments.relative();
         let presence = Presence::of(scene, camera);
         let result = |(counts, variance): (Counts, f64)| {
             let candidate = Candidate::with_counts(counts, guided && counts.light_paths > 0);

@@ -79,23 +79,23 @@ type Halves = [Vec<[DVec3; PARTS]>; 2];
 type LightHalves = [Vec<DVec3>; 2];
 
 /// Renders a picture to measure effects. Returns its pixels, and the means of their additive parts over each half of
-/// the iterations.
-fn render_halves(scene: &Scene, camera: &Camera, settings: &Settings) -> (Vec<PixelAccumulator>, Halves) {
+/// the iterations; `None` if the user stops the render.
+fn render_halves(scene: &Scene, camera: &Camera, settings: &Settings) -> Option<(Vec<PixelAccumulator>, Halves)> {
     let input = RenderInput::new(scene, camera, settings);
     let mut session = Session::new(&input);
     let mut advance = || {
         for _ in 0..HALF {
             session.step();
         }
-        session.pixels().to_vec()
+        (!settings.stop.requested()).then(|| session.pixels().to_vec())
     };
-    let [first, all] = [advance(), advance()];
+    let (first, all) = (advance()?, advance()?);
     let mean = |sums: [DVec3; PARTS]| sums.map(|sum| sum / HALF as f64);
     let halves = [
         first.iter().map(|pixel| mean(parts(pixel))).collect(),
         first.iter().zip(&all).map(|(first, all)| mean(difference(&parts(all), &parts(first)))).collect(),
     ];
-    (all, halves)
+    Some((all, halves))
 }
 
 /// Sums of the additive parts of a pixel.
@@ -133,12 +133,12 @@ struct Reference {
 }
 
 impl Reference {
-    fn new(view: View<'_>, settings: &Settings) -> Reference {
-        let (pixels, halves) = render_halves(view.scene, view.camera, settings);
+    fn new(view: View<'_>, settings: &Settings) -> Option<Reference> {
+        let (pixels, halves) = render_halves(view.scene, view.camera, settings)?;
         let values = reference_values(&pixels, view.camera.size(), settings.levels);
         let total = 0.5 * light(&halves, None).iter().flatten().map(|light| mean(*light)).sum::<f64>();
         let floor = floor::relative_to_mean(values.iter().copied());
-        Reference { halves, values, floor, total: total.max(f64::MIN_POSITIVE) }
+        Some(Reference { halves, values, floor, total: total.max(f64::MIN_POSITIVE) })
     }
 
     /// Share of this light in all light of the picture, 0 to 1.
@@ -170,7 +170,12 @@ impl Reference {
     }
 
     /// Weights of all light effects that are present in the scene.
-    fn weigh_light_effects(&self, view: View<'_>, settings: &Settings, presence: &Presence) -> Vec<WeighedEffect> {
+    fn weigh_light_effects(
+        &self,
+        view: View<'_>,
+        settings: &Settings,
+        presence: &Presence,
+    ) -> Option<Vec<WeighedEffect>> {
         let mut weighed = Vec::new();
         let mut rest = self.halves.clone();
         for effect in EFFECTS_WITHOUT_PART.into_iter().filter(|effect| presence.has(*effect)) {
@@ -178,7 +183,7 @@ impl Reference {
             if settings.classes.is_empty() {
                 continue;
             }
-            let (_, alone) = render_halves(view.scene, view.camera, &settings);
+            let (_, alone) = render_halves(view.scene, view.camera, &settings)?;
             weighed.push(self.weigh_light(effect, &light(&alone, None)));
             for (rest, alone) in rest.iter_mut().flatten().zip(alone.iter().flatten()) {
                 *rest = difference(rest, alone);
@@ -189,7 +194,7 @@ impl Reference {
                 weighed.push(self.weigh_light(effect, &light_of_part(&rest, part)));
             }
         }
-        weighed
+        Some(weighed)
     }
 
     /// Weight of an effect that is a property of the scene, measured by a picture without it. `energy` is its share of
@@ -200,27 +205,27 @@ impl Reference {
         without: View<'_>,
         settings: &Settings,
         energy: Option<f64>,
-    ) -> EffectWeight {
-        let (_, halves) = render_halves(without.scene, without.camera, settings);
+    ) -> Option<EffectWeight> {
+        let (_, halves) = render_halves(without.scene, without.camera, settings)?;
         let lost = light(&self.halves, Some(&halves));
         let (relmse, noise) = self.relmse(&lost);
         let energy = energy.or_else(|| (effect == Effect::Environment).then(|| self.energy(&lost)));
         let error_if_off = (relmse > SIGNIFICANCE * noise).then(|| relmse.sqrt());
-        EffectWeight { effect, energy, error_if_off, saved: None }
+        Some(EffectWeight { effect, energy, error_if_off, saved: None })
     }
 }
 
 /// Measures the weights of the light effects that are present, and of `scene_effects`, in a small picture. `settings`
-/// find all light; `count` counts the vertices in a scene without an effect.
+/// find all light; `count` counts the vertices in a scene without an effect. `None` if the user stops the measurement.
 pub(super) fn weigh(
     view: View<'_>,
     settings: &Settings,
     presence: &Presence,
     scene_effects: &[Effect],
     count: impl Fn(&Scene, &Camera) -> Cost,
-) -> Vec<WeighedEffect> {
-    let reference = Reference::new(view, settings);
-    let mut weighed = reference.weigh_light_effects(view, settings, presence);
+) -> Option<Vec<WeighedEffect>> {
+    let reference = Reference::new(view, settings)?;
+    let mut weighed = reference.weigh_light_effects(view, settings, presence)?;
     for &effect in scene_effects {
         // The lens belongs to the camera, not to the scene.
         let rebuilt = (effect != Effect::DepthOfField).then(|| switch::without_effect(view.scene, effect));
@@ -231,10 +236,10 @@ pub(super) fn weigh(
         };
         let as_light = weighed.iter().position(|weighed| weighed.weight.effect == effect);
         let energy = as_light.and_then(|index| weighed.swap_remove(index).weight.energy);
-        let weight = reference.weigh_scene_effect(effect, View::new(scene, &camera), settings, energy);
+        let weight = reference.weigh_scene_effect(effect, View::new(scene, &camera), settings, energy)?;
         weighed.push(WeighedEffect { weight, cost_without: Some(count(scene, &camera)) });
     }
-    weighed
+    Some(weighed)
 }
 
 impl WeighedEffect {

@@ -10,6 +10,7 @@ use caustique::pipeline::plan::{PlannedPicture, plan_picture};
 use caustique::pipeline::{Forecast, Loaded, MethodRequest, forecast, with_light_paths};
 use caustique::plan::{EffectPlan, Plan};
 use caustique::scene::View;
+use caustique::stop::Stop;
 use serde_json::json;
 
 /// Show which effects a scene calls for, which will be simulated, and why.
@@ -49,7 +50,7 @@ fn report(args: &PlanArgs) -> Result<()> {
     let loaded = scene::read(&options.scene, form, rayon::current_num_threads())?;
     let auto = matches!(request.method, MethodRequest::Auto(_));
     let doing = if auto { "choosing a method" } else { "planning" };
-    let planned = form.during(doing, || plan_picture(request, &options.scene.path, &loaded, || false))?;
+    let planned = form.during(doing, || plan_picture(request, &options.scene.path, &loaded, &Stop::default()))?;
     let forecast = options.target_error.map(|target| Ok((target, forecast_error(args, &loaded, &planned, target)?)));
     let forecast = forecast.transpose()?;
     let plan = &planned.plan;

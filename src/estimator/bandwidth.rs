@@ -173,6 +173,9 @@ fn bandwidths<P: Located, const MAPS: usize>(
         (width, height),
         || (Bump::new(), std::array::from_fn::<_, MAPS, _>(|_| Nearest::default())),
         |(arena, nearest), found, places| {
+            if camera_paths.is_stopped() {
+                return;
+            }
             let starts = camera_paths.starts(places, streams);
             for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
                 let of = |point| std::array::from_fn(|map| of_point(map, &mut nearest[map], &point));

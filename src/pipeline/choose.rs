@@ -9,6 +9,7 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::render::output::layer_shape;
 use crate::render::{Candidate, Settings, TimeSpent};
 use crate::scene::View;
+use crate::stop::Stop;
 
 /// The settings of a render, and how its method was chosen.
 pub struct Chosen {
@@ -35,14 +36,14 @@ impl Chosen {
 }
 
 /// Settles the method: the one that the user names, or the candidate (method and settings) that `auto` finds best.
-/// `checked`: the settings if nothing is compared. `accepts` rejects candidates by their settings. Once `stop` returns
-/// true, the comparison ends as soon as it can, and its result is not to be used.
+/// `checked`: the settings if nothing is compared. `accepts` rejects candidates by their settings. If `stop` is requested,
+/// the comparison ends as soon as it can, and its result is not to be used.
 pub fn choose(
     method: &mut MethodRequest<'_>,
     checked: Settings,
     view: View<'_>,
     accepts: impl Fn(&Settings) -> bool,
-    stop: impl Fn() -> bool,
+    stop: &Stop,
 ) -> Chosen {
     let MethodRequest::Auto(auto) = method else { return Chosen::named(checked) };
     let settings_of = |candidate| {
@@ -72,9 +73,9 @@ pub(super) fn choose_for_render(
     let method = &mut request.picture.method;
     let chosen = if let MethodRequest::Auto(_) = method {
         let stop = observer.stop();
-        during(Phase::Choosing, observer, |_| choose(method, checked, view, has_layers, || stop.requested()))
+        during(Phase::Choosing, observer, |_| choose(method, checked, view, has_layers, &stop))
     } else {
-        choose(method, checked, view, has_layers, || false)
+        choose(method, checked, view, has_layers, &Stop::default())
     };
     observer.event(Event::Chosen(chosen.choice.as_ref()));
     refuse_stop(observer)?;

@@ -21,7 +21,9 @@ use std::path::Path;
 use std::time::Duration;
 
 /// Time after a coarse picture in which the next view may come before the whole picture begins.
-const NEXT_VIEW_MILLISECONDS: u64 = 20;
+const NEXT_VIEW_MILLISECONDS: u64 = 100;
+/// Iterations for which `auto` chooses, at most. Its pilot takes a share of the render, and a viewer waits for it.
+const MAX_CHOICE_ITERATIONS: u64 = 8;
 /// Fewest light paths of an iteration of the coarse picture.
 const MIN_COARSE_PHOTONS: u32 = 1000;
 
@@ -70,7 +72,7 @@ pub struct LiveEnd {
 /// # Errors
 /// Options that contradict the scene; memory; the denoiser; motion blur.
 pub fn render_live(
-    mut request: LiveRequest<'_>,
+    request: LiveRequest<'_>,
     loaded: &Loaded,
     mut finish: Option<&mut OpenFinish>,
     show: &mut dyn FnMut(Shown<'_>) -> bool,
@@ -82,15 +84,15 @@ pub fn render_live(
     }
     let checked = check_picture(&request.picture, request.path, scene)?;
     let view = View::new(scene, &checked.camera);
-    let method = &mut request.picture.method;
-    let (name, finishes) = (method.name(), finish.is_some());
+    let (name, finishes) = (request.picture.method.name(), finish.is_some());
     let memory = MemoryCheck { view, method: name, finishes, limit: request.memory };
     let fit = |settings: Settings| {
         let (settings, _) = memory.fit(settings)?;
         Ok(Settings { stop: request.stop.clone(), target_error: None, ..settings })
     };
-    let known =
-        request.candidate.map(|candidate| chosen_before(method, Some(candidate), checked.settings.clone(), view));
+    let known = request
+        .candidate
+        .map(|candidate| chosen_before(&request.picture.method, Some(candidate), checked.settings.clone(), view));
     if request.coarse > 1 {
         // The choice of a method takes longer than the coarse picture, so it comes later.
         let settings = known.as_ref().map_or(&checked.settings, |chosen| &chosen.settings);
@@ -109,13 +111,19 @@ pub fn render_live(
         }
         wait_for_next(&request.stop);
     }
-    let chosen = known.unwrap_or_else(|| choose(method, checked.settings, view, |_| true, || request.stop.requested()));
+    let iterations = checked.settings.iterations;
+    let chosen = known.unwrap_or_else(|| {
+        let most = iterations.map_or(MAX_CHOICE_ITERATIONS, |iterations| iterations.min(MAX_CHOICE_ITERATIONS));
+        let mut method =
+            request.picture.method.map_candidates(|settings| Settings { iterations: Some(most), ..settings });
+        choose(&mut method, checked.settings, view, |_| true, &request.stop)
+    });
     if request.stop.requested() {
         // A choice that was interrupted is not used again.
         return Ok(LiveEnd { progress: None, reason: StopReason::Interrupted, candidate: request.candidate });
     }
     let candidate = chosen.candidate;
-    let settings = fit(chosen.settings)?;
+    let settings = fit(Settings { iterations, ..chosen.settings })?;
     let input = RenderInput::new(scene, &checked.camera, &settings);
     let (progress, reason, failure) = run(&input, finish, false, show)?;
     failure.map_or(Ok(LiveEnd { progress, reason, candidate }), Err)

@@ -14,6 +14,7 @@ use crate::plan::{self, Plan, Switches};
 use crate::render::Settings;
 use crate::render::output::layer_shape;
 use crate::scene::{Scene, View};
+use crate::stop::Stop;
 use std::path::Path;
 
 /// Method and switches of a render, the input of its plan besides the scene.
@@ -66,7 +67,7 @@ pub fn plan_picture(
     mut picture: PictureRequest<'_>,
     path: &Path,
     loaded: &Loaded,
-    stop: impl Fn() -> bool,
+    stop: &Stop,
 ) -> Result<PlannedPicture> {
     let Loaded { scene, removed, .. } = loaded;
     let checked = check_picture(&picture, path, scene)?;

@@ -70,14 +70,26 @@ impl<'a> RenderInput<'a> {
         self.settings.camera_paths(self.scene, self.camera, &self.initial_media)
     }
 
-    /// All pixels before the first iteration, for methods whose pixels have no bandwidths.
+    /// All pixels before the first iteration, for methods whose pixels have no bandwidths; none if the user has stopped the
+    /// render.
     pub(in crate::render) fn initial_pixels(&self) -> Vec<PixelAccumulator> {
-        self.settings.initial_pixels(self.scene, self.camera)
+        self.settings.pixels(self.scene, &vec![[0.0; 2]; self.pixels()])
+    }
+
+    /// All pixels of a render without iterations.
+    pub(in crate::render) fn empty_pixels(&self) -> Vec<PixelAccumulator> {
+        vec![self.settings.pixel_factory(self.scene)(&[0.0; 2]); self.pixels()]
     }
 
     /// Width and height of the picture (pixels).
     pub fn size(&self) -> (u32, u32) {
         self.camera.size()
+    }
+
+    /// Number of pixels.
+    pub fn pixels(&self) -> usize {
+        let (width, height) = self.size();
+        width as usize * height as usize
     }
 }
 

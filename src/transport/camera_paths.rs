@@ -70,6 +70,12 @@ impl CameraPaths<'_> {
         self.stop.is_some_and(Stop::should_abort)
     }
 
+    /// Whether the user has stopped the render. Work before the first iteration, which has no deadline, polls this.
+    #[inline]
+    pub fn is_stopped(&self) -> bool {
+        self.stop.is_some_and(Stop::requested)
+    }
+
     /// Depth along the camera axis and position of the first hit of a sample (scene units, in the coordinates of the
     /// scene file); `None` if it hits nothing.
     pub fn first_hit(&self, sample: &PixelSample) -> Option<(f32, Vec3)> {

@@ -135,9 +135,9 @@ fn check_predictions(rooms: Range<u64>) {
     }
 }
 
-/// A proxy that is stopped, such as after a tenth of `--time`, keeps the two iterations that a variance needs at least.
+/// A proxy that is late, such as after a tenth of `--time`, keeps the two iterations that a variance needs at least.
 #[test]
-fn a_stopped_proxy_keeps_two_iterations() {
+fn a_late_proxy_keeps_two_iterations() {
     let scene = random_room(0);
     let camera = scene.camera(&square(SIZE)).expect("a camera");
     let settings = settings(Counts::DEFAULT, 1);
@@ -150,7 +150,7 @@ fn a_stopped_proxy_keeps_two_iterations() {
         typical_iteration: 1,
         candidates: &candidates,
     };
-    let variances = |iterations, stopped: &dyn Fn() -> bool| proxy.measure(None, iterations, stopped).relative();
+    let variances = |iterations, late: &dyn Fn() -> bool| proxy.measure(None, iterations, late).relative();
     assert_eq!(variances(50, &|| true), variances(2, &|| false));
     assert_ne!(variances(3, &|| false), variances(2, &|| false));
 }

@@ -258,7 +258,7 @@ impl Comparison {
             let settings = with_light_paths(settings, options.photons, camera.size());
             let limited = RenderOptions { time: self.time(), ..options.clone() };
             let mut method = limited.method_request()?;
-            let chosen = choose(&mut method, settings, view, |_| true, || callback.caller.stops());
+            let chosen = choose(&mut method, settings, view, |_| true, &callback.caller.stop());
             let decided = chosen.spent();
             let (max_depth, switches) = (self.common.max_depth, scene.options.switches());
             let plan = plan::plan(PlanInput { chosen: &chosen, max_depth, switches }, view, &scene.loaded.removed);

@@ -181,7 +181,7 @@ impl Scene {
         keywords.check_all_taken()?;
         let done = work(py, threads, |caller| {
             let picture = render.picture_request()?;
-            let planned = plan_picture(picture, &self.path, &self.loaded, || caller.stops())?;
+            let planned = plan_picture(picture, &self.path, &self.loaded, &caller.stop())?;
             Ok(json!(planned.plan))
         })?;
         to_python(py, &done.whole()?)

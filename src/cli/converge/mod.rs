@@ -60,7 +60,7 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
         })?;
     }
     let interrupt = Interrupt::install()?;
-    let runs = choose_all(args, runs, view, &interrupt)?;
+    let runs = choose_all(args, runs, view)?;
     interrupt.check_before_first_iteration(&args.output)?;
     memory::check_all(view, runs.iter().map(|(run, _)| &run.entry.settings))?;
     let seeds: Vec<u64> = (0..args.seeds).map(|i| args.seed.wrapping_add(i)).collect();
@@ -145,12 +145,7 @@ fn windows(args: &ConvergeArgs, camera: &Camera) -> Result<Vec<Window>> {
 
 /// Settles the light paths of all runs, and the method of the runs by `auto`, with the limits of a run. Prints the
 /// choices.
-fn choose_all(
-    args: &ConvergeArgs,
-    runs: Vec<Run>,
-    view: View<'_>,
-    interrupt: &Interrupt,
-) -> Result<Vec<(Run, Chosen)>> {
+fn choose_all(args: &ConvergeArgs, runs: Vec<Run>, view: View<'_>) -> Result<Vec<(Run, Chosen)>> {
     let choose_one = |mut run: Run| {
         let Settings { max_depth, seed, .. } = run.entry.settings;
         let (iterations, time) = (args.iterations, time(args));
@@ -158,7 +153,7 @@ fn choose_all(
         let settings = with_light_paths(run.entry.settings.clone(), run.args.photons, view.camera.whole()[0]);
         let chosen = {
             let mut method = run.args.method_request()?.map_candidates(limits);
-            let work = || choose(&mut method, settings, view, |_| true, || interrupt.requested());
+            let work = || choose(&mut method, settings, view, |_| true, &Interrupt::stop());
             args.progress.during("choosing a method", work)
         };
         if let Some(choice) = &chosen.choice {

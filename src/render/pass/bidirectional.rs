@@ -507,7 +507,7 @@ impl Integrator for Passes {
             _ => FOOTPRINT_PIXELS.min(widest * camera.whole_width()),
         };
         self.covered = std::f32::consts::PI * covered * covered;
-        let pixels: Vec<PixelAccumulator> = all.into_iter().map(settings.pixel_factory(scene)).collect();
+        let pixels = settings.pixels(scene, &all);
         self.initial = pixels.iter().map(|pixel| pixel.bandwidths[0]).collect();
         pixels
     }

@@ -77,13 +77,13 @@ pub(super) fn learn_guide(
         ((f64::from(settings.photons) * LIGHT_PATHS_RATIO) as u32).clamp(MIN_LIGHT_PATHS, MAX_LIGHT_PATHS);
     let mut guide = Guide::new(&camera_paths.scene.lights, camera_paths.indirect == Indirect::Photons)?;
     for round in 0..ROUNDS {
-        if settings.stop.requested() {
-            // The first iteration is aborted, too.
-            return None;
-        }
         let (maps, walked) =
             trace_photons(camera_paths, initial_media, &Round { seed, index: round, light_paths, region }, &guide);
         let error = estimate_error(camera_paths, seed, round, &maps, guide.cells());
+        if camera_paths.is_stopped() {
+            // Some paths are missing. The first iteration is aborted, too.
+            return None;
+        }
         let paths: Vec<f64> = walked.iter().map(|of| of.paths).collect();
         let work: Vec<f64> = walked.iter().map(|of| of.work).collect();
         if round + 1 == ROUNDS
@@ -153,7 +153,7 @@ fn trace_photons(
         let (mut photons, mut arena, mut guided) =
             (Photons::default(), Bump::new(), ByKind::<Vec<GuidedPhoton>>::default());
         let mut walked = vec![CellPaths::default(); guide.cells()];
-        for index in paths {
+        for index in paths.take_while(|_| !camera_paths.is_stopped()) {
             let path = light_path(camera_paths.scene, &arena, initial_media, &paths_of_round, index, &mut photons);
             let Some((cell, vertices)) = path else { continue };
             arena.reset();
@@ -219,7 +219,7 @@ fn estimate_error(
     let look = |first: u32| {
         let mut error = CellErrors::zero(cells);
         let (mut arena, mut nearest) = (Bump::new(), ByKind::<Nearest<GuidedPhoton>>::default());
-        for index in first..paths.min(first + CHUNK) {
+        for index in (first..paths.min(first + CHUNK)).take_while(|_| !camera_paths.is_stopped()) {
             arena.reset();
             let stream = Stream::new(seed, round, Domain::GuideCamera, u64::from(index));
             let pixel = ((f64::from(index) + f64::from(offset)) * pixels as f64 / f64::from(paths)) as u64;

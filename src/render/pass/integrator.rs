@@ -25,7 +25,7 @@ pub(in crate::render) struct Work {
 /// are arguments, because they move between iterations if there is motion blur.
 pub(in crate::render) trait Integrator {
     /// Runs the pilot that finds the initial bandwidths, if the method has one, and makes the pixels for the first
-    /// iteration.
+    /// iteration; none if the user has stopped the render.
     fn pixels(&mut self, input: &RenderInput<'_>) -> Vec<PixelAccumulator>;
     /// Adds iteration `i` (from 1) to all pixels, and its core-seconds to `phases`. Returns `None` if the iteration was
     /// interrupted ([`Settings::stop`](crate::render::Settings::stop)) and has changed nothing.

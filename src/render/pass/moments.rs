@@ -326,8 +326,9 @@ impl Proxy<'_> {
         self.settings.guided.then(|| learn_guide(&camera_paths, &initial_media, self.settings, None)).flatten()
     }
 
-    /// Renders `iterations` iterations, or fewer once `stopped` returns true.
-    pub fn measure(&self, guide: Option<&Guide>, iterations: u64, stopped: &dyn Fn() -> bool) -> Moments {
+    /// Renders `iterations` iterations, or fewer, but at least two, once `late` returns true. The result is useless if the
+    /// user stops the render ([`Settings::stop`]).
+    pub fn measure(&self, guide: Option<&Guide>, iterations: u64, late: &dyn Fn() -> bool) -> Moments {
         let initial_media = InitialMedia::of(self.scene, self.camera);
         let camera_paths = self.settings.camera_paths(self.scene, self.camera, &initial_media);
         let (width, height) = self.camera.size();
@@ -362,12 +363,12 @@ impl Proxy<'_> {
             candidates: self.candidates.iter().map(|counts| Factors::new(*counts, covered)).collect(),
             of_proxy: Factors::new(Counts::DEFAULT, covered),
         };
-        walks.run(iterations, stopped)
+        walks.run(iterations, late)
     }
 }
 
 impl Walks<'_, '_> {
-    fn run(&self, iterations: u64, stopped: &dyn Fn() -> bool) -> Moments {
+    fn run(&self, iterations: u64, late: &dyn Fn() -> bool) -> Moments {
         let none = Block { sums: vec![Sums::default(); self.candidates.len()], ..Block::default() };
         let mut blocks = vec![none; self.blocks.pixels()];
         let mut direct = vec![[Rgb::ZERO; 2]; self.radius2.len()];
@@ -375,7 +376,7 @@ impl Walks<'_, '_> {
         let mut done = 0;
         // The first iteration leaves the photons for the second, and is not counted.
         for iteration in 0..=iterations {
-            if done >= 2 && stopped() {
+            if self.proxy.settings.stop.requested() || (done >= 2 && late()) {
                 break;
             }
             let maps = photons.build();
@@ -446,6 +447,9 @@ impl Walks<'_, '_> {
         let first = row as u32 * self.side;
         for y in first..(first + self.side).min(height) {
             for x0 in (0..width).step_by(GROUP_SIZE) {
+                if self.proxy.settings.stop.requested() {
+                    return output;
+                }
                 let places = std::array::from_fn(|k| {
                     let x = x0 + k as u32;
                     let index = u64::from(y * width + x);

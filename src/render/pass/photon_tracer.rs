@@ -159,7 +159,7 @@ impl PhotonTracer {
             (InitialBandwidth::Nearest(k), Indirect::Paths) => median_radius2(&maps[Kind::Caustic as usize], k),
             _ => f32::INFINITY,
         };
-        let mut pixels: Vec<_> = bandwidths.into_iter().map(settings.pixel_factory(scene)).collect();
+        let mut pixels = settings.pixels(scene, &bandwidths);
         if scene.survey.scattering {
             let pilot = PhotonMap::build(pilot.volume);
             let bandwidths = initial_volume_bandwidths(camera_paths, initial, volume, seed, &pilot);

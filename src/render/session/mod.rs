@@ -36,7 +36,8 @@ pub struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    /// Starts a render and runs its pilot, which finds the initial bandwidths, if the method has one.
+    /// Starts a render and runs its pilot, which finds the initial bandwidths, if the method has one. If the user stops
+    /// the render meanwhile, it ends early, and there are no iterations.
     pub fn new(input: &'a RenderInput<'a>) -> Session<'a> {
         Session::with_time_spent(input, TimeSpent::default())
     }
@@ -61,7 +62,7 @@ impl<'a> Session<'a> {
         let State { pixels, counters, passes } = state;
         let Settings { levels, lobes, .. } = &input.settings;
         let groups = input.settings.light_groups(input.scene);
-        let fits = pixels.len() == session.pixels.len()
+        let fits = pixels.len() == input.pixels()
             && pixels.iter().all(|pixel| pixel.holds(levels.count, groups, *lobes))
             && session.integrator.restore(&passes);
         fits.then(|| Session { pixels, counters, ..session })
@@ -88,6 +89,9 @@ impl<'a> Session<'a> {
 
     /// Renders one iteration; discards it and returns false if it takes more than `seconds` or the user stops it.
     pub fn step_within(&mut self, seconds: Option<f64>) -> bool {
+        if self.settings().stop.requested() {
+            return false;
+        }
         let mut time = self.counters.stats.time;
         self.settings().stop.start_iteration(seconds);
         let done = time.measure(|| self.iterate());
@@ -269,6 +273,9 @@ impl<'a> Session<'a> {
 
     /// Ends the render for the reason `stop`, and returns its result.
     pub fn finish(mut self, stop: StopReason) -> Rendered {
+        if self.pixels.is_empty() {
+            self.pixels = self.input.empty_pixels();
+        }
         let error = self.estimate_error();
         self.error = Some(error);
         if self.iterations() > 0 && !self.is_recorded() {
@@ -305,13 +312,16 @@ impl Settings {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::Camera;
     use crate::math::DAffine3;
+    use crate::render::Method;
     use crate::scene::description::{CameraDescription, Projection};
     use crate::scene::{CameraRequest, Description, Scene};
+    use crate::stop::Stop;
+    use std::sync::Arc;
 
-    /// The sums of a pixel are exact for 2^23 terms.
-    #[test]
-    fn a_render_ends_at_the_number_of_iterations_that_pixels_sum_exactly() {
+    /// A scene with nothing but a camera of two pixels.
+    fn empty_scene() -> (Scene, Camera) {
         let mut description = Description::default();
         let projection = Projection::Perspective { yfov: 1.0, aspect: Some(1.0) };
         description.cameras.push(CameraDescription {
@@ -325,6 +335,13 @@ mod tests {
         let scene = Scene::build(description, 1).unwrap();
         let camera =
             scene.camera(&CameraRequest { width: Some(2), height: Some(1), ..CameraRequest::default() }).unwrap();
+        (scene, camera)
+    }
+
+    /// The sums of a pixel are exact for 2^23 terms.
+    #[test]
+    fn a_render_ends_at_the_number_of_iterations_that_pixels_sum_exactly() {
+        let (scene, camera) = empty_scene();
         for (iterations, last) in [(None, MAX_TERMS), (Some(1 << 40), MAX_TERMS), (Some(100), 100)] {
             let input = RenderInput::new(&scene, &camera, &Settings { iterations, ..Settings::default() });
             let mut session = Session::new(&input);
@@ -332,6 +349,19 @@ mod tests {
             assert!(!session.is_finished());
             session.step();
             assert!(session.is_finished() && session.iterations() == 1);
+        }
+    }
+    /// A render that the user has stopped before it starts makes no pixels, and still has a picture.
+    #[test]
+    fn a_render_that_is_stopped_at_once_has_a_black_picture() {
+        let (scene, camera) = empty_scene();
+        for method in Method::ALL.iter().copied() {
+            let stop = Stop::from_flag(Arc::new(true.into()));
+            let input = RenderInput::new(&scene, &camera, &Settings { method, stop, ..Settings::default() });
+            let mut session = Session::new(&input);
+            assert!(session.pixels().is_empty() && !session.step_within(None), "{method:?}");
+            let rendered = session.finish(StopReason::Interrupted);
+            assert_eq!((rendered.pixels.len(), rendered.stats.iterations), (2, 0), "{method:?}");
         }
     }
 }

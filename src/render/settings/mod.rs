@@ -24,12 +24,15 @@ use crate::plan::{ClassSet, Owner, Search, classes_in};
 use crate::scene::{Scene, Survey};
 use crate::stop::Stop;
 use crate::transport::{CameraPaths, Indirect, InitialMedia, MAX_LEVELS};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Number of iterations of a render without a stop condition.
 pub const DEFAULT_ITERATIONS: u64 = 64;
 /// Largest default number of light paths per iteration, so that the photon maps of huge pictures fit into memory.
 const MAX_DEFAULT_PHOTONS: u32 = 10_000_000;
+/// Pixels that are made between two polls of the user's request to stop.
+const PIXELS_PER_STEP: usize = 1 << 15;
 /// Default of [`Settings::photon_memory`] (bytes).
 pub const DEFAULT_MAP_MEMORY: u64 = 1 << 30;
 
@@ -227,16 +230,25 @@ impl Settings {
 
     /// Returns a function that makes a pixel before the first iteration, from its largest initial bandwidths by kind of
     /// photons.
-    pub(in crate::render) fn pixel_factory(&self, scene: &Scene) -> impl Fn(ByKind<f32>) -> PixelAccumulator + use<> {
+    pub(in crate::render) fn pixel_factory(&self, scene: &Scene) -> impl Fn(&ByKind<f32>) -> PixelAccumulator + use<> {
         let (levels, exponent) = (self.levels.count, scene.lights.irradiance_exponent());
         let (groups, lobes) = (self.light_groups(scene), self.lobes);
-        move |bandwidths| PixelAccumulator::new(levels, exponent, bandwidths).with_groups(groups).with_lobes(lobes)
+        move |bandwidths| PixelAccumulator::new(levels, exponent, *bandwidths).with_groups(groups).with_lobes(lobes)
     }
 
-    /// All pixels before the first iteration, for methods whose pixels have no bandwidths.
-    pub(in crate::render) fn initial_pixels(&self, scene: &Scene, camera: &Camera) -> Vec<PixelAccumulator> {
-        let (width, height) = camera.size();
-        vec![self.pixel_factory(scene)([0.0; 2]); width as usize * height as usize]
+    /// All pixels before the first iteration, from their largest initial bandwidths by kind of photons; none if the user
+    /// has stopped the render.
+    pub(in crate::render) fn pixels(&self, scene: &Scene, bandwidths: &[ByKind<f32>]) -> Vec<PixelAccumulator> {
+        let pixel = self.pixel_factory(scene);
+        let mut pixels = Vec::with_capacity(bandwidths.len());
+        // Most of the time goes to the system, which provides the memory when it is first written.
+        for part in bandwidths.chunks(PIXELS_PER_STEP) {
+            if self.stop.requested() {
+                return Vec::new();
+            }
+            pixels.par_extend(part.par_iter().map(&pixel));
+        }
+        pixels
     }
 
     /// Number of light groups with layers of their own, and one more for the light on shadow catchers if there are any.
