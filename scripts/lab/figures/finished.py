@@ -78,6 +78,12 @@ def programs():
     return rows + ([("auto", Path(options.before).resolve(), "auto before")] if options.before else [])
 
 
+def new_cell(scene, budget, reference):
+    """A cell of a scene at a budget, before anything is measured."""
+    cell = {"scene": references.name(scene), "budget": budget, "floor": max(reference.error / 50, 1e-9)}
+    return cell | {key: {} for key in ("ours", "peers", "core_seconds", "notes", "chosen")}
+
+
 def ours(scene, budget, reference, halves, cell):
     """Measures our renders of a scene at a budget, and adds them to a cell."""
     for denoise in denoisers():
@@ -152,8 +158,7 @@ def measure(scene, names):
     cells = []
     for budget in options.budgets:
         # Errors below a fiftieth of the reference's own count as this.
-        cell = {"scene": references.name(scene), "budget": budget, "floor": max(reference.error / 50, 1e-9)}
-        cell.update({key: {} for key in ("ours", "peers", "core_seconds", "notes", "chosen")})
+        cell = new_cell(scene, budget, reference)
         own = f"reference by {made['options'][1]}, its own relMSE {reference.error:.2g}"
         print(f"\n{cell['scene']}, {budget:g} s, {own}\n{COLUMNS}", flush=True)
         ours(scene, budget, reference, halves, cell)

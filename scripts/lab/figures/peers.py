@@ -61,8 +61,7 @@ def compare(scene, names):
     halves, made = references.reference(scene)
     reference = Reference.read(halves)
     peers = peer_runs.Peers(scene, reference.mean.shape[0])
-    cell = {"scene": references.name(scene), "budget": options.budgets[0], "floor": max(reference.error / 50, 1e-9)}
-    cell.update({key: {} for key in ("ours", "peers", "core_seconds", "notes")})
+    cell = finished.new_cell(scene, options.budgets[0], reference)
     print(f"\n{cell['scene']}\n{finished.COLUMNS}", flush=True)
     finished.ours(scene, options.budgets[0], reference, halves, cell)
     finished.others(peers, names, options.budgets[0], reference, halves, cell)
@@ -122,4 +121,6 @@ def main():
             print(f"{peer:<22}{key:<16}{mean:>15.3f}{worst:>8.2f}{better:>6}/{count}")
     settings = {"program": program(), **{key: getattr(options, key) for key in ("width", "threads", "clock")}}
     settings["seconds"] = options.budgets[0]
+    if options.set == "twins":
+        settings["set"] = "twins"
     record("peers", {**settings, "compared": list(COMPARED), "all_figures": FIGURES, "summary": found, "rows": rows})

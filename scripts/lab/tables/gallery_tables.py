@@ -16,6 +16,7 @@ NAMES = {
     "lux_bidirvm": "LuxCore, bidirectional with merging",
     "cycles_path": "Cycles, path",
     "cycles_guiding": "Cycles, path guiding",
+    "cycles_caustics": "Cycles, shadow caustics",
 }
 # Notes of stored figures, in the words that the drivers use today.
 NOTES = {
