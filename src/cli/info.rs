@@ -7,12 +7,8 @@ use super::{plot, print, print_json, printable, scene};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::{LayerSet, describe};
 use caustique::image::exr;
-use caustique::light::{Emitter, Pattern};
-use caustique::math::Vec3;
 use caustique::options::SceneOptions;
-use caustique::pipeline::{FINISHED_PICTURE, Place};
-use caustique::scene::Scene;
-use caustique::scene::description::FileContents;
+use caustique::pipeline::{FINISHED_PICTURE, Place, scene_info};
 use serde_json::{Map, Value, json};
 use std::fs::File;
 use std::io::Read;
@@ -53,7 +49,7 @@ pub fn run(args: &InfoArgs) -> Result<()> {
     let scene = super::pool(0)?
         .install(|| scene::read(&options, Form::for_output(args.json), rayon::current_num_threads()))?
         .scene;
-    let mut object = scene_object(path, &scene);
+    let mut object = scene_info(path, &scene);
     if args.json {
         return print_json(&object);
     }
@@ -184,84 +180,6 @@ fn accuracy_text(object: &Value) -> String {
         text += &format!("  {width} x {height} pixels at {x},{y}: {}\n", place_of(tile));
     }
     text
-}
-
-fn scene_object(path: &Path, scene: &Scene) -> Value {
-    let shapes = &scene.shapes;
-    let stored: usize = shapes.meshes.iter().map(|mesh| mesh.triangles.len()).sum();
-    let materials: Vec<&str> = scene.materials.list.iter().map(|m| m.name.as_str()).collect();
-    let cameras: Vec<&str> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
-    let textures = scene.materials.textures.iter();
-    let textures = textures.map(|t| json!({"name": t.name, "width": t.width, "height": t.height}));
-    let mut lights = Map::new();
-    for emitter in scene.lights.emitters() {
-        let kind = kind(emitter);
-        let count = lights.get(kind).and_then(Value::as_u64).unwrap_or(0);
-        lights.insert(kind.into(), (count + 1).into());
-    }
-    let FileContents { scenes, scene: shown, animations, variants, extensions } = &scene.contents;
-    json!({
-        "scene": path.display().to_string(),
-        "scenes": scenes,
-        "scene_shown": shown.map(|index| &scenes[index]),
-        "animations": animations,
-        "variants": variants,
-        "extensions": extensions,
-        "objects": scene.objects,
-        "triangles_of_objects": triangles_of_objects(scene),
-        "meshes": shapes.meshes.len(),
-        "instances": shapes.instances.len(),
-        "triangles": shapes.triangles(),
-        "triangles_stored": stored,
-        "materials": materials,
-        "textures": scene.materials.textures.len(),
-        "texture_sizes": textures.collect::<Vec<Value>>(),
-        "lights": lights,
-        "light_names": light_names(scene),
-        "cameras": cameras,
-        "dimensions": dimensions(scene),
-        "radius": scene.lights.sky().radius,
-        "warnings": scene.warnings,
-    })
-}
-
-/// Number of triangles of each object.
-fn triangles_of_objects(scene: &Scene) -> Vec<usize> {
-    let mut counts = vec![0; scene.objects.len()];
-    for instance in &scene.shapes.instances {
-        counts[instance.object as usize] += scene.shapes.meshes[instance.mesh as usize].triangles.len();
-    }
-    counts
-}
-
-/// Names of the lights: points, spots and suns, objects that emit light, and the environment.
-fn light_names(scene: &Scene) -> Vec<String> {
-    let mut names: Vec<String> = (0..scene.lights.emitters().len()).map(|index| scene.light_name(index)).collect();
-    // All triangles of an object have its name.
-    names.dedup();
-    names
-}
-
-/// Extents of the scene along X, Y and Z (m).
-fn dimensions(scene: &Scene) -> [f32; 3] {
-    let (low, high) = scene.shapes.bounds();
-    (high - low).max(Vec3::ZERO).to_array()
-}
-
-fn kind(emitter: &Emitter) -> &'static str {
-    match emitter {
-        Emitter::Point { .. } => "point",
-        Emitter::Spot { .. } => "spot",
-        Emitter::Shaped(shaped) => match (&**shaped.distribution.pattern(), shaped.distribution.cone()) {
-            (Pattern::Profile(_), None) => "point with a profile",
-            (Pattern::Profile(_), Some(_)) => "spot with a profile",
-            (Pattern::Picture(_), _) => "spot with a picture",
-        },
-        Emitter::Volume(_) => "emissive medium",
-        Emitter::Sun { .. } => "sun",
-        Emitter::Environment => "environment",
-        _ => "emissive triangles",
-    }
 }
 
 /// Largest number of names of a kind (such as materials) that the text lists.

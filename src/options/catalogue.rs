@@ -76,7 +76,7 @@ const NOT_IN_PYTHON: [(&str, &str); 18] = [
     ("half", "an argument of Image.save"),
     ("multi_part", "an argument of Image.save"),
     ("colorspace", "an argument of Image.save"),
-    ("exr_naming", "layers in memory have plain names"),
+    ("exr_naming", "an argument of Image.save"),
     ("usd_layer", "a file beside the EXR"),
     ("preview", "the callback progress shows how a render goes"),
     ("progress", "its progress is a callback"),

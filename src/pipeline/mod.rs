@@ -33,6 +33,7 @@ mod request;
 mod resume;
 mod run;
 mod saver;
+mod scene_info;
 pub mod seeds;
 pub mod shard;
 mod slow_iteration;
@@ -48,6 +49,7 @@ pub use load::{Loaded, SceneRequest};
 pub use observer::{Event, Observer, Phase};
 pub use rendered_file::RenderedFile;
 pub use request::{AutoRequest, MethodRequest, PictureRequest, Request, Saving};
+pub use scene_info::scene_info;
 pub use worst::{Place, Tile, Worst};
 
 use crate::error::{Error, ErrorKind, Result};

@@ -17,13 +17,26 @@ import os
 from collections.abc import Sequence
 
 from . import _native
-from ._native import Error, Image, Progress, SceneWarning, __version__, compare, finish, merge, read
+from ._native import (
+    Error,
+    FinishedFrames,
+    Image,
+    Progress,
+    SceneWarning,
+    __version__,
+    compare,
+    finish,
+    finish_frames,
+    merge,
+    read,
+)
 from .glb import pack
 from .meshes import Camera, Light, Material, Medium, Mesh, PointLight, SpotLight, SunLight, Texture
 
 __all__ = [
     "Camera",
     "Error",
+    "FinishedFrames",
     "Image",
     "Light",
     "Material",
@@ -39,6 +52,7 @@ __all__ = [
     "__version__",
     "compare",
     "finish",
+    "finish_frames",
     "libraries",
     "merge",
     "pack",

@@ -10,6 +10,7 @@ from typing_extensions import disjoint_base
 
 __all__ = [
     "Error",
+    "FinishedFrames",
     "Image",
     "Progress",
     "Scene",
@@ -18,6 +19,7 @@ __all__ = [
     "compare",
     "find_libraries",
     "finish",
+    "finish_frames",
     "merge",
     "read",
 ]
@@ -65,6 +67,8 @@ class Image:
     def picture(self) -> NDArray[np.float32]: ...
     @property
     def header(self) -> dict[str, Any]: ...
+    @property
+    def descriptions(self) -> dict[str, str]: ...
     def keys(self) -> list[str]: ...
     def save(
         self,
@@ -73,6 +77,7 @@ class Image:
         compression: Literal["zip", "zips", "piz", "none"] = "zip",
         half: bool = False,
         multi_part: bool = False,
+        exr_naming: Literal["plain", "blender"] = "plain",
         colorspace: Literal["rec709", "acescg"] = "rec709",
         exposure: float = 0.0,
         tonemap: Literal["agx", "filmic", "neutral", "srgb"] = "agx",
@@ -114,6 +119,7 @@ class Scene:
     def cameras(self) -> list[str]: ...
     @property
     def contents(self) -> dict[str, Any]: ...
+    def info(self) -> dict[str, Any]: ...
     def render(
         self,
         *,
@@ -239,6 +245,19 @@ def compare(
     page: str | os.PathLike[str] | None = None,
 ) -> dict[str, Any]: ...
 def finish(image: Image, *, denoise: _Denoise = "auto", model: str | None = None, threads: int = 0) -> Image: ...
+@final
+class FinishedFrames:
+    def __iter__(self) -> FinishedFrames: ...
+    def __next__(self) -> tuple[int, Image]: ...
+
+def finish_frames(
+    pattern: str | os.PathLike[str],
+    *,
+    frames: Sequence[int] | None = None,
+    denoise: _Denoise = "auto",
+    model: str | None = None,
+    threads: int = 0,
+) -> FinishedFrames: ...
 def merge(
     paths: Sequence[str | os.PathLike[str]],
     *,

@@ -29,12 +29,18 @@ FACTORS = {
     "iridescence": ("KHR_materials_iridescence", "iridescenceFactor", 0.0),
     "iridescence_ior": ("KHR_materials_iridescence", "iridescenceIor", 1.3),
     "iridescence_thickness": ("KHR_materials_iridescence", "iridescenceThicknessMaximum", 400.0),
+    "iridescence_thickness_minimum": ("KHR_materials_iridescence", "iridescenceThicknessMinimum", 100.0),
     "diffuse_transmission": ("KHR_materials_diffuse_transmission", "diffuseTransmissionFactor", 0.0),
     "diffuse_transmission_color": (
         "KHR_materials_diffuse_transmission", "diffuseTransmissionColorFactor", (1.0, 1.0, 1.0)),
     "sheen_color": ("KHR_materials_sheen", "sheenColorFactor", (0.0, 0.0, 0.0)),
     "sheen_roughness": ("KHR_materials_sheen", "sheenRoughnessFactor", 0.0),
     "anisotropy": ("KHR_materials_anisotropy", "anisotropyStrength", 0.0),
+}
+#: {material field of a texture: its extension, its key}
+TEXTURES = {
+    "iridescence_texture": ("KHR_materials_iridescence", "iridescenceTexture"),
+    "iridescence_thickness_texture": ("KHR_materials_iridescence", "iridescenceThicknessTexture"),
 }
 #: {material field: its default}, for fields that are keys of `extras.caustique`
 OWN = {"diffuse_roughness": 0.0, "coat_ior": 1.5, "coat_color": (1.0, 1.0, 1.0), "sheen_model": "charlie"}
@@ -231,6 +237,10 @@ class Writer:
         if material.alpha < 1.0 or channels(material.base_color_texture) == 4:
             item["alphaMode"] = "BLEND"
         extensions = self.layers(material)
+        for name, (extension, key) in TEXTURES.items():
+            if getattr(material, name) is not None:
+                of_extension = extensions.setdefault(extension, {})
+                of_extension[key] = self.texture(f"{place}, {key}", getattr(material, name))
         if emission.any():
             strength = max(1.0, float(emission.max()))
             item["emissiveFactor"] = numbers(emission / strength)

@@ -96,6 +96,11 @@ class Material:
     iridescence: float = 0.0
     iridescence_ior: float = 1.3
     iridescence_thickness: float = 400.0
+    #: (H, W, 3) uint8: red multiplies iridescence.
+    iridescence_texture: ArrayLike | Texture | None = None
+    #: (H, W, 3) uint8: green mixes iridescence_thickness_minimum, nm, where it is 0, and iridescence_thickness.
+    iridescence_thickness_texture: ArrayLike | Texture | None = None
+    iridescence_thickness_minimum: float = 100.0
     #: Share of the diffuse light that leaves on the other side of a thin sheet, 0 to 1, and its colour (r, g, b).
     diffuse_transmission: float = 0.0
     diffuse_transmission_color: Triple = (1.0, 1.0, 1.0)

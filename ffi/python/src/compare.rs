@@ -1,15 +1,9 @@
-//! Errors of pictures, and the finish of pictures that were rendered before.
+//! Errors of pictures.
 
 use crate::error::raised;
-use crate::image::{Image, picture};
-use crate::options::finish_request;
+use crate::image::picture;
 use crate::value::to_python;
-use crate::work::work;
-use caustique::film::take_plain_names;
-use caustique::image::exr::ATTRIBUTE;
 use caustique::image::{Floor, atomic, compare_with_floor, heat};
-use caustique::pipeline::finish::open;
-use caustique::pipeline::write_finish;
 use caustique::report::errors;
 use numpy::IntoPyArray;
 use numpy::ndarray::Array2;
@@ -52,36 +46,4 @@ pub fn compare<'py>(
         figures.set_item("flip_map", map.into_pyarray(py))?;
     }
     Ok(figures)
-}
-
-/// A new image whose picture is finished as a render finishes its own. All other layers stay.
-///
-/// The image needs an estimate of its noise: the layers of a render, or from another renderer "Variance" (of the mean) or
-/// two independent halves "Half1" and "Half2". The denoiser also uses "albedo" and "normal". Layers with Blender's names
-/// (ViewLayer.Combined) get the names and axes of this package.
-#[pyfunction]
-#[pyo3(signature = (image, *, denoise = "auto", model = None, threads = 0))]
-pub fn finish(
-    py: Python<'_>,
-    image: &Bound<'_, Image>,
-    denoise: &str,
-    model: Option<String>,
-    threads: usize,
-) -> PyResult<Image> {
-    let request = finish_request("finish", denoise, model)?;
-    let image = image.get();
-    let done = work(py, threads, |caller| {
-        let mut opened = open(&request, None)?;
-        let missing = opened.missing.take();
-        caller.warn(&missing.map(|error| super::options::missing_denoiser(&error)).into_iter().collect::<Vec<_>>());
-        let (mut set, mut attributes) = (image.set.clone(), image.attributes.clone());
-        let left = |name: String| format!("layer \"{name}\" cannot be written under this name and is left out");
-        caller.warn(&take_plain_names(&mut set).into_iter().map(left).collect::<Vec<_>>());
-        let account = opened.finish().apply(&mut set, |_| true)?;
-        let mut header = attributes.object().unwrap_or_else(|| json!({"version": env!("CARGO_PKG_VERSION")}));
-        write_finish(&mut header, &opened, &account);
-        attributes.insert(ATTRIBUTE, &header)?;
-        Ok(Image { set, attributes, sums: None })
-    })?;
-    done.whole()
 }

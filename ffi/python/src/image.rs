@@ -4,7 +4,7 @@ use crate::error::{raised, usage};
 use crate::keywords::choice;
 use crate::value::{to_json, to_python};
 use caustique::error::{Error, ErrorKind};
-use caustique::film::{Layer, LayerSet, Plane, Sample};
+use caustique::film::{Layer, LayerDescription, LayerSet, Plane, Sample, describe};
 use caustique::image::exr::{self, Attributes};
 use caustique::image::png;
 use caustique::image::tonemap::ToneMap;
@@ -113,6 +113,18 @@ impl Image {
         }
     }
 
+    /// What each layer holds, {layer: "meaning [unit]"}, without layers of other programs.
+    #[getter]
+    fn descriptions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let all = PyDict::new(py);
+        for layer in &self.set.layers {
+            if let Some(LayerDescription { meaning, unit, .. }) = describe(&layer.name) {
+                all.set_item(&layer.name, format!("{meaning} [{unit}]"))?;
+            }
+        }
+        Ok(all)
+    }
+
     /// Names of the layers; the picture itself is "".
     fn keys(&self) -> Vec<String> {
         self.set.layers.iter().map(|layer| layer.name.clone()).collect()
@@ -174,11 +186,12 @@ impl Image {
     /// compression   of the EXR: 'zip', 'zips', 'piz' or 'none'; all are lossless
     /// half          store layers for which half floats suffice as such: the picture, its finished parts, albedo, normals
     /// multi_part    store each layer as a part of the EXR, for programs that unpack all channels of a part
+    /// exr_naming    names of the channels of the EXR: 'plain' or 'blender'
     /// colorspace    of the EXR: 'rec709' or 'acescg'
     /// exposure      of the PNG, stops
     /// tonemap       of the PNG: 'agx', 'filmic', 'neutral' or 'srgb'
     #[pyo3(signature = (
-        path, *, compression = "zip", half = false, multi_part = false, colorspace = "rec709", exposure = 0.0,
+        path, *, compression = "zip", half = false, multi_part = false, exr_naming = "plain", colorspace = "rec709", exposure = 0.0,
         tonemap = "agx"
     ))]
     #[expect(clippy::too_many_arguments, reason = "they are those of Python's signature")]
@@ -189,18 +202,20 @@ impl Image {
         compression: &str,
         half: bool,
         multi_part: bool,
+        exr_naming: &str,
         colorspace: &str,
         exposure: f32,
         tonemap: &str,
     ) -> PyResult<()> {
         let compression = choice("save: compression", compression)?;
+        let naming = choice("save: exr_naming", exr_naming)?;
         let colour_space = choice("save: colorspace", colorspace)?;
         let curve = choice("save: tonemap", tonemap)?;
         let is = |extension: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension));
         let set = &self.set;
         let written = py.detach(|| match () {
             () if is("exr") => {
-                let options = exr::Options { compression, half, multi_part, colour_space, ..exr::Options::default() };
+                let options = exr::Options { compression, naming, half, multi_part, colour_space };
                 exr::write_followed(&path, set, &self.attributes, options, |file| {
                     self.sums.as_ref().map_or(Ok(()), |sums| sums.write(file))
                 })

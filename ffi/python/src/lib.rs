@@ -6,6 +6,7 @@
 mod compare;
 mod converge;
 mod error;
+mod finish;
 mod image;
 mod keywords;
 mod libraries;
@@ -22,9 +23,11 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use super::compare::{compare, finish};
+    use super::compare::compare;
     #[pymodule_export]
     use super::error::{Error, SceneWarning};
+    #[pymodule_export]
+    use super::finish::{FinishedFrames, finish, finish_frames};
     #[pymodule_export]
     use super::image::{Image, read};
     #[pymodule_export]

@@ -14,7 +14,9 @@ use caustique::image::atomic;
 use caustique::options::SceneOptions;
 use caustique::pipeline::load::{Environment, load, load_bytes};
 use caustique::pipeline::plan::plan_picture;
-use caustique::pipeline::{self, Delivery, Event, Loaded, Observer, Request, Saving, SceneRequest, checkpoint};
+use caustique::pipeline::{
+    self, Delivery, Event, Loaded, Observer, Request, Saving, SceneRequest, checkpoint, scene_info,
+};
 use caustique::scene::description::EnvironmentSource;
 use caustique::stop::Stop;
 use pyo3::prelude::*;
@@ -170,6 +172,11 @@ impl Scene {
             (Err(error), None) => return Err(raised(error)),
         };
         delivered(py, delivery)
+    }
+
+    /// What the scene contains: the object of `caustique info --json`, a dict.
+    fn info<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        to_python(py, &scene_info(&self.path, &self.loaded.scene))
     }
 
     #[doc = include_str!("plan.txt")]

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +32,22 @@ class Layers(unittest.TestCase):
             self.image.save(file)
             self.assertEqual(self.image._repr_png_(), file.read_bytes())
         self.assertTrue(self.image._repr_png_().startswith(b"\x89PNG"))
+
+    def test_files_may_have_the_names_of_blender(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "picture.exr"
+            self.image.save(file, exr_naming="blender")
+            named = cq.read(file)
+            self.assertIn("ViewLayer.Combined", named.keys())
+            np.testing.assert_array_equal(named["ViewLayer.Combined.R"], self.image["R"])
+            with self.assertRaisesRegex(cq.Error, "exr_naming='nuke' does not exist: plain, blender|one of"):
+                self.image.save(file, exr_naming="nuke")
+
+    def test_layers_are_described(self):
+        described = self.image.descriptions
+        self.assertEqual(list(described), self.image.keys())
+        self.assertIn("[m]", described["Z"])
+        self.assertEqual(cq.Image.from_arrays({"own": np.zeros((2, 2))}).descriptions, {})
 
     def test_planes_are_not_copied(self):
         image = self.image
@@ -154,6 +171,32 @@ class Errors(unittest.TestCase):
         self.assertEqual(finished.header, expected.header)
         self.assertNotEqual(finished.header["error_of"], raw.header["error_of"])
         np.testing.assert_array_equal(finished.picture, expected.picture)
+
+    def test_frames_are_finished_as_by_the_command_line(self):
+        program = os.environ.get("CAUSTIQUE_BIN", ROOT / "target" / "release" / "caustique")
+        scene = still_life()
+        with tempfile.TemporaryDirectory() as folder:
+            pattern = Path(folder) / "shot.####.exr"
+            for frame in (1, 2, 4):
+                options = {"method": "path", "iterations": 8, "width": 24, "height": 16, "seed": frame}
+                scene.render(layers="all,Motion", finish=False, **options).save(Path(folder) / f"shot.{frame:04}.exr")
+            done = Path(folder) / "done.####.exr"
+            subprocess.run([program, "finish", pattern, "-o", done, "--denoise", "own"], check=True, capture_output=True)
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                finished = dict(cq.finish_frames(pattern, denoise="own"))
+            self.assertIn("frame 3 is missing", str(caught[0].message))
+            self.assertEqual(list(finished), [1, 2, 4])
+            for frame, image in finished.items():
+                expected = cq.read(Path(folder) / f"done.{frame:04}.exr")
+                self.assertEqual(image.header, expected.header)
+                self.assertEqual(sorted(image.keys()), sorted(expected.keys()))
+                np.testing.assert_array_equal(image.picture, expected.picture)
+            self.assertEqual([frame for frame, _ in cq.finish_frames(pattern, frames=[2, 2], denoise="own")], [2])
+            with self.assertRaisesRegex(cq.Error, "no frame 3\\nhint: .*leave it out of frames"):
+                cq.finish_frames(pattern, frames=[3])
+            with self.assertRaisesRegex(cq.Error, "no file has such a name"):
+                cq.finish_frames(Path(folder) / "other.####.exr")
 
     def test_renders_of_different_seeds_are_averaged(self):
         program = os.environ.get("CAUSTIQUE_BIN", ROOT / "target" / "release" / "caustique")

@@ -119,6 +119,24 @@ class BesideTheCommandLine(unittest.TestCase):
                 there = b.layers[name][component][window]
                 self.assertTrue(values.tobytes() == there.tobytes(), f"{name}.{component}")
 
+    def test_info_is_that_of_the_program(self):
+        output = subprocess.run([self.PROGRAM, "info", "--json", TORUS], check=True, capture_output=True).stdout
+        self.assertEqual(cq.Scene(TORUS).info(), json.loads(output))
+
+    def test_a_texture_makes_a_film_as_thick_as_the_number(self):
+        def picture(**film):
+            matte = cq.Material(base_color=(0.5, 0.5, 0.5), roughness=0.3, iridescence=1.0, **film)
+            vertices, triangles = square()
+            mesh = cq.Mesh(vertices=vertices, triangles=triangles, uvs=vertices[:, :2], material=matte)
+            camera = cq.Camera(position=(0, 3, 0), up=(0, 0, 1))
+            scene = cq.Scene.from_meshes([mesh], cameras=[camera], environment=(1.0, 1.0, 1.0))
+            return scene.render(method="path", iterations=4, width=8, height=8, finish=False).picture
+
+        half = np.full((2, 2, 3), 51, np.uint8)  # a fifth
+        textured = picture(iridescence_thickness_texture=half, iridescence_thickness=500, iridescence_thickness_minimum=250)
+        np.testing.assert_allclose(textured, picture(iridescence_thickness=300), rtol=1e-5)
+        self.assertGreater(np.abs(textured / picture(iridescence_thickness=500) - 1).max(), 0.01)
+
     def test_materials_have_the_parameters_of_gltf(self):
         """Each is in the packed file, and the reader accepts all of them without a warning."""
         image = np.full((2, 2, 4), 128, np.uint8)
@@ -129,7 +147,8 @@ class BesideTheCommandLine(unittest.TestCase):
             iridescence=0.5, iridescence_thickness=300.0, diffuse_transmission=0.25,
             anisotropy=0.5, anisotropy_rotation=90, specular_color=(1, 0.5, 0.2), double_sided=True,
             diffuse_roughness=0.5, coat_ior=1.75, coat_color=(1, 0.5, 0.25), sheen_model="fibers",
-            diffuse_roughness_texture=image[..., :3], coat_color_texture=image[..., :3],
+            iridescence_texture=image[..., :3], iridescence_thickness_texture=image[..., :3],
+            iridescence_thickness_minimum=200.0, diffuse_roughness_texture=image[..., :3], coat_color_texture=image[..., :3],
             coat_ior_texture=cq.Texture(pixels=image[..., :3], scale=(2, 2)),
         )
         vertices, triangles = square()
@@ -144,8 +163,10 @@ class BesideTheCommandLine(unittest.TestCase):
         self.assertEqual(material["extensions"]["KHR_materials_specular"]["specularColorFactor"], [1, 0.5, 0.2])
         self.assertEqual(material["extensions"]["KHR_materials_clearcoat"],
                          {"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.1})
-        self.assertEqual(material["extensions"]["KHR_materials_iridescence"],
-                         {"iridescenceFactor": 0.5, "iridescenceThicknessMaximum": 300})
+        film = material["extensions"]["KHR_materials_iridescence"]
+        self.assertEqual(len({film.pop(key)["index"] for key in ("iridescenceTexture", "iridescenceThicknessTexture")}), 2)
+        self.assertEqual(film, {"iridescenceFactor": 0.5, "iridescenceThicknessMaximum": 300,
+                                "iridescenceThicknessMinimum": 200})
         self.assertEqual(material["extensions"]["KHR_materials_diffuse_transmission"], {"diffuseTransmissionFactor": 0.25})
         own = material["extras"]["caustique"]
         textures = {name: own.pop(f"{name}_texture") for name in ("diffuse_roughness", "coat_ior", "coat_color")}
