@@ -62,7 +62,7 @@ cp README.md CHANGELOG.md CITATION.cff "$notices/"
 "$program" completions zsh >"$tree/share/zsh/site-functions/_caustique"
 "$program" completions fish >"$tree/share/fish/vendor_completions.d/caustique.fish"
 "$program" man >"$tree/share/man/man1/caustique.1"
-for command in render plan finish merge compare converge info doctor; do
+for command in $("$program" man | sed -n 's/^caustique\\-\([a-z]*\)(1)$/\1/p' | grep -v help); do
     "$program" man "$command" >"$tree/share/man/man1/caustique-$command.1"
 done
 archive=$out/caustique-$version-linux-x86_64.tar.gz

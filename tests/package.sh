@@ -62,7 +62,7 @@ check 'tarball: its own libraries' uses_own "$home" "$home/bin/caustique"
 check 'tarball: doctor without USD' says 'Embree .*from package' "$home/bin/caustique" doctor
 check 'tarball: ONNX Runtime' "$home/bin/caustique" render "$scene" -o net.exr --model compact "${small[@]}"
 share=$home/share
-check 'tarball: manual' holds "$share"/man/man1/caustique{,-render,-plan}.1
+check 'tarball: manual' holds "$share"/man/man1/caustique{,-render,-plan,-serve}.1
 check 'tarball: licences' holds "$share"/doc/caustique/LICENSE-{MIT,APACHE} \
     "$share"/doc/caustique/{README,embree,oidn,tbb,onnxruntime,onnxruntime-licence,rust}.txt
 check 'tarball: completions' bash -n "$share/bash-completion/completions/caustique"
