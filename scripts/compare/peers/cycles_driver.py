@@ -207,7 +207,8 @@ def area_light(scene, matrix, radiance):
     # Blender's lights shine along -z.
     turned = matrix.copy()
     turned[:3, 0], turned[:3, 1], turned[:3, 2] = matrix[:3, 0] / width, -matrix[:3, 1] / height, -matrix[:3, 2]
-    add(scene, data, turned, "lamp")
+    # Blender's new lights are invisible to the camera.
+    add(scene, data, turned, "lamp").visible_camera = True
 
 
 def cast_caustics(scene, casters):
