@@ -62,6 +62,11 @@ def image_clipped(stage):
 
 
 @feature
+def image_subsurface(stage):
+    stage.principled(Base_Color=_image(stage), Subsurface_Weight=1.0, Subsurface_Scale=0.1)
+
+
+@feature
 def image_beside_noise(stage):
     move = stage.node("Mapping", Vector=_coordinates(stage, "UV"), Scale=(3, 2, 1))
     stage.principled(Base_Color=stage.node("TexImage", move, image=_checks(stage)), Roughness=_noise(stage).outputs[0])
