@@ -51,8 +51,6 @@ def _colour(socket):
     temperature = constant(node.inputs["Temperature"])
     if temperature is None:
         return None
-    if not hasattr(bpy.types.Light, "temperature"):  # before Blender 4.5
-        return None
     colours = blackbodies([temperature])
     return colours and colours[0]
 
