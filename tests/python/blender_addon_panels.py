@@ -43,7 +43,7 @@ class Panels(Installed):
             preferences=types.SimpleNamespace(system=types.SimpleNamespace(ui_scale=1.0)))
         for module, name, wanted in (
             ("scene_panels", "FilmPanel", {"film_transparent", "film_exposure"}),
-            ("scene_panels", "PerformancePanel", {"threads", "threads_mode"}),
+            ("scene_panels", "PerformancePanel", {"threads", "threads_mode", "use_persistent_data"}),
             ("scene_panels", "SimplifyPanel", {"simplify_subdivision_render"}),
             ("scene_panels", "MotionBlurPanel", {"motion_blur_position", "motion_blur_shutter"}),
             ("scene_panels", "ObjectMotionBlurPanel", {"motion_steps", "use_deform_motion"}),

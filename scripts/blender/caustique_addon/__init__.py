@@ -1,14 +1,14 @@
 """caustique as a render engine of Blender: an add-on for Blender 3.4, an extension for 4.2 and newer.
 
-A render writes a copy of the scene, exports it in a second Blender process (`handoff`), runs the program on the export
-(`run`), shows the picture so far, and loads the layers as passes (`engine`, `passes`). A viewport keeps the program
-running (`viewport`, `live`, `server`). The program renders; the panels show its messages unchanged (`session`,
-`panels`).
+A render writes a copy of the scene, exports it in a second Blender process (`handoff`), which the frames of an animation
+may share (`persistent_data`), runs the program on the export (`run`), shows the picture so far, and loads the layers as
+passes (`engine`, `passes`). A viewport keeps the program running (`viewport`, `live`, `server`). The program renders; the
+panels show its messages unchanged (`session`, `panels`).
 """
 
 from . import (
-    blender_panels, diagnosis, engine, handoff, material_panel, panels, preferences, presets_menu, properties, scene_panels,
-    viewport,
+    blender_panels, diagnosis, engine, handoff, material_panel, panels, persistent_data, preferences, presets_menu,
+    properties, scene_panels, viewport,
 )
 
 # Blender before 4.2 reads this dictionary, later versions blender_manifest.toml.
@@ -23,8 +23,8 @@ bl_info = {
 }
 
 # Order matters: the engine and the panels use the properties.
-_PARTS = (preferences, properties, handoff, viewport, engine, diagnosis, presets_menu, panels, scene_panels, material_panel,
-          blender_panels)
+_PARTS = (preferences, properties, handoff, persistent_data, viewport, engine, diagnosis, presets_menu, panels, scene_panels,
+          material_panel, blender_panels)
 
 
 def register():

@@ -13,7 +13,9 @@ import time
 import bpy
 import numpy
 
-from . import command, exr, handoff, ignored_settings, passes, preferences, program, resume, run, session, viewport
+from . import (
+    command, exr, handoff, ignored_settings, passes, persistent_data, preferences, program, resume, run, session, viewport,
+)
 from .fault import Cancelled, fault_from_error
 
 _POLL_SECONDS = 0.1  # between two checks of the program's progress
@@ -73,8 +75,9 @@ class Engine(bpy.types.RenderEngine):
         try:
             self._render(depsgraph, folder)
         except Cancelled:
-            pass
+            persistent_data.end()
         except Exception as error:
+            persistent_data.end()
             fault = fault_from_error(error)
             session.faults[depsgraph.scene.name] = fault
             self.report({"ERROR"}, fault.message())  # ends an animation, too; `error_set` would not
@@ -92,8 +95,7 @@ class Engine(bpy.types.RenderEngine):
         self.update_stats("", "Exporting")
         frame = scene.frame_current + scene.frame_subframe
         job = handoff.Job(depsgraph.scene, view_layer.name, frame, folder, chosen.exporter)
-        self._warn(scene, handoff.in_main_thread(job.copy, self._is_cancelled))
-        self._warn(scene, job.run(self._is_cancelled, lambda text: self.update_stats("", text)))
+        self._export(job)
 
         output, preview = os.path.join(folder, "render.exr"), os.path.join(folder, "preview.exr")
         words = [path, "render", handoff.GLB, "--exr-naming", "blender", "--compression", "none",
@@ -109,6 +111,8 @@ class Engine(bpy.types.RenderEngine):
             saved.started(work.process_id)
             stopped = self._watch(work, saved, preview, view_layer.name, part)
             work.finish()
+            if stopped:
+                persistent_data.end()
             if stopped and work.progress is not None:
                 session.stopped[scene.name] = work.progress["iteration"]
         finally:
@@ -118,6 +122,18 @@ class Engine(bpy.types.RenderEngine):
         if not os.path.isfile(output):  # stopped before the first iteration
             raise Cancelled()
         self._deliver(exr.Picture(output), scene, view_layer.name, part)
+
+    def _export(self, job):
+        """Export a frame."""
+        def tell(text):
+            self.update_stats("", text)
+
+        scene = job.exporter.scene
+        if persistent_data.applies(scene, self.is_animation):
+            self._warn(scene, persistent_data.export(job, self._is_cancelled, tell))
+            return
+        self._warn(scene, handoff.in_main_thread(job.copy, self._is_cancelled))
+        self._warn(scene, job.run(self._is_cancelled, tell))
 
     def _is_cancelled(self):
         """Whether the user has pressed Esc."""

@@ -1,9 +1,11 @@
-"""Exports one frame of a scene in a second Blender process: `blender -b --python export_job.py -- JOB.json`.
+"""Exports frames of scenes in a second Blender process: `blender -b --python export_job.py`.
 
-The job is an object: `blend` (the file), `scene`, `view_layer`, `frame` (with its fraction), `scripts` (whether Python
-in the file may run), `exporter` (the folder of export.py), `glb` (the file to write), `progress` (the file to write what
-it does to), `only` (names of changed objects to export, or null for all) and `report` (the file to write
-{"warnings": [..], "only": [..]} or {"error": "..", "place": ".."} to; `only` has the exported objects, or is null for all).
+It reads jobs from standard input, one per line, and ends with the input. A job is an object in JSON: `blend` (the file),
+`scene`, `view_layer`, `frame` (with its fraction), `scripts` (whether Python in the file may run), `exporter` (the folder of
+export.py), `glb` (the file to write), `progress` (the file to write what it does to), `only` (names of changed objects to
+export, or null for all) and `report` (the file to write {"warnings": [..], "only": [..], "animates_all": ..} or
+{"error": "..", "place": ".."} to at last; `only` has the exported objects, or is null for all; `animates_all`: whether this
+Blender knows all properties that the file animates).
 """
 
 import json
@@ -24,19 +26,71 @@ def export(job):
     scene.render.engine = "CYCLES"  # this Blender lacks the add-on, and the exporter reads the scene as Cycles would
     scene.render.use_border = False  # the add-on crops the picture itself
     scene.render.use_compositing = False  # the first Blender composes the picture
+    # Makes the dependency graph the active one: only that writes animated values of materials to their data.
+    bpy.context.evaluated_depsgraph_get()
     whole = int(job["frame"] // 1)
     scene.frame_set(whole, subframe=job["frame"] - whole)
-    sys.path.insert(0, job["exporter"])
+    if job["exporter"] not in sys.path:
+        sys.path.insert(0, job["exporter"])
     import export as exporter  # its folder is on the search path of this process alone
 
     def tell(text):
-        with open(job["progress"] + ".new", "w", encoding="utf-8") as file:
-            file.write(text)
-        os.replace(job["progress"] + ".new", job["progress"])
+        write(job["progress"], text)
 
     only = None if job["only"] is None else exporter.selection(scene, job["only"])
     warnings = exporter.write(job["glb"], progress=tell, only=only)
-    return {"warnings": warnings, "only": None if only is None else sorted(only)}
+    return {"warnings": warnings, "only": None if only is None else sorted(only), "animates_all": animates_all()}
+
+
+def animates_all():
+    """Whether this Blender knows all properties that the file animates. It does not know those of the user's add-ons, whose
+    values in the file are those of the frame at which the first Blender wrote it."""
+    for kind in bpy.data.bl_rna.properties:
+        for block in getattr(bpy.data, kind.identifier) if kind.type == "COLLECTION" else ():
+            for owner in (block, getattr(block, "node_tree", None)):
+                animation = getattr(owner, "animation_data", None)
+                if animation is not None and not all(knows(owner, curve) for curve in curves(animation)):
+                    return False
+    return True
+
+
+def knows(owner, curve):
+    """Whether the property that a curve animates exists."""
+    try:
+        owner.path_resolve(curve.data_path, False)
+    except ValueError:
+        return False
+    return True
+
+
+def curves(animation):
+    """The curves of a data block's animation, its drivers included."""
+    yield from animation.drivers
+    yield from curves_of_action(animation)
+    strips = [strip for track in animation.nla_tracks for strip in track.strips]
+    while strips:
+        strip = strips.pop()
+        yield from curves_of_action(strip)
+        yield from strip.fcurves
+        strips += getattr(strip, "strips", ())  # of a meta strip
+
+
+def curves_of_action(owner):
+    """The curves of the action of an animation or a strip. Since Blender 4.4 an action has curves of several data blocks."""
+    action = owner.action
+    if action is None:
+        return ()
+    if not hasattr(owner, "action_slot_handle"):
+        return action.fcurves
+    return [curve for layer in action.layers for strip in layer.strips for bag in strip.channelbags
+            if bag.slot_handle == owner.action_slot_handle for curve in bag.fcurves]
+
+
+def write(path, text):
+    """Write a whole file at once, because the first Blender may look for it at any time."""
+    with open(path + ".new", "w", encoding="utf-8") as file:
+        file.write(text)
+    os.replace(path + ".new", path)
 
 
 def place_of(error, folder):
@@ -47,20 +101,18 @@ def place_of(error, folder):
     return f"{os.path.basename(frames[-1].filename)}, line {frames[-1].lineno}"
 
 
-def main(path):
-    """Do the job in the file `path` and write the report."""
-    with open(path, encoding="utf-8") as file:
-        job = json.load(file)
+def main(job):
+    """Do a job and write its report."""
     try:
         report = export(job)
     except Exception as error:  # the first Blender shows any error of this one
         traceback.print_exc()
         report = {"error": f"{type(error).__name__}: {error}", "place": place_of(error, job["exporter"])}
-    with open(job["report"], "w", encoding="utf-8") as file:
-        json.dump(report, file)
+    write(job["report"], json.dumps(report))
 
 
 if __name__ == "__main__":
-    main(sys.argv[-1])
+    for line in sys.stdin:
+        main(json.loads(line))
     sys.stdout.flush()
     os._exit(0)  # Blender as a module may hang while it shuts down

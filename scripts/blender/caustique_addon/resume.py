@@ -15,7 +15,7 @@ _MAX_AGE_DAYS = 7
 _MAX_KEPT = 2  # checkpoints of other renders, which may take gigabytes
 _CLOCK_SECONDS = 0.1  # precision of the times of files
 _SUFFIX, _PROCESS = ".checkpoint", ".process"
-_OWN_FILES = {"job.json", "export.log", "report.json", "progress.txt", "scene.blend"}
+_OWN_FILES = {"export.log", "report.json", "progress.txt", "scene.blend"}
 
 
 def _folder():

@@ -36,7 +36,7 @@ class FilmPanel(Panel, bpy.types.Panel):
 
 
 class PerformancePanel(Panel, bpy.types.Panel):
-    """The number of threads."""
+    """The number of threads, and what frames share."""
 
     bl_idname = "CAUSTIQUE_PT_performance"
     bl_label = "Performance"
@@ -48,6 +48,7 @@ class PerformancePanel(Panel, bpy.types.Panel):
         value = column.row()
         value.active = render.threads_mode == "FIXED"
         value.prop(render, "threads")
+        column.prop(render, "use_persistent_data", text="Persistent Data")
 
 
 class SimplifyPanel(Panel, bpy.types.Panel):
