@@ -38,6 +38,16 @@ struct Network {
     training: String,
 }
 
+/// Reads the network of a request, so that a wrong name is found before any work is done.
+///
+/// # Errors
+/// The network or ONNX Runtime is missing.
+pub fn check(request: &FinishRequest) -> Result<()> {
+    let Some(name) = request.model.as_deref() else { return Ok(()) };
+    Model::open(name)?;
+    find_runtime().map(drop)
+}
+
 /// Finds the libraries and loads the network, with the threads of the current rayon pool. `levels`: the number of
 /// bandwidth levels of the render, if known.
 ///
@@ -52,12 +62,7 @@ pub fn open(request: &FinishRequest, levels: Option<usize>) -> Result<OpenFinish
 
 fn open_network(name: &str, levels: Option<usize>) -> Result<(Network, Combiner)> {
     let model = Model::open(name)?;
-    let runtime = Runtime::find().map_err(|mut error| {
-        let advice = "or leave --model out: levels are not combined by the network then";
-        error.hint = Some(error.hint.map_or(advice.into(), |hint| format!("{hint}; {advice}")));
-        error
-    })?;
-    let combiner = Combiner::new(&model, &runtime)?;
+    let combiner = Combiner::new(&model, &find_runtime()?)?;
     let facts = combiner.metadata();
     if let Some(levels) = levels.filter(|levels| *levels != facts.levels) {
         let cause = format!("the network {name} combines {} levels, not {levels}", facts.levels);
@@ -66,6 +71,14 @@ fn open_network(name: &str, levels: Option<usize>) -> Result<(Network, Combiner)
     }
     let network = Network { name: name.into(), training: facts.training.clone() };
     Ok((network, combiner))
+}
+
+fn find_runtime() -> Result<Runtime> {
+    Runtime::find().map_err(|mut error| {
+        let advice = "or leave --model out: levels are not combined by the network then";
+        error.hint = Some(error.hint.map_or(advice.into(), |hint| format!("{hint}; {advice}")));
+        error
+    })
 }
 
 impl OpenFinish {

@@ -265,6 +265,15 @@ fn a_closed_stdout_is_not_an_error() {
     }
 }
 
+/// A network that does not exist is found before `auto` chooses a method.
+#[test]
+fn a_missing_network_is_found_before_any_work() {
+    let folder = Folder::new();
+    let outcome = folder.run("render scene.glb -o out.exr --iterations 100000 --model none.onnx --progress plain");
+    assert_eq!(outcome.code, Some(1), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("none.onnx") && !outcome.stderr.contains("method:"), "{}", outcome.stderr);
+}
+
 /// If the network fails when it runs, the unfinished render is written. Its stride is changed to 3, which does not fit
 /// its grids of 4.
 #[test]

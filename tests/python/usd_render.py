@@ -170,6 +170,8 @@ class Program(usd_support.Stages):
         self.assertIn("motion blur is the mean of 8 moments", said)
         _, said = mean()
         self.assertIn("/Camera: its shutter is ignored, because no frame is given (--frames gives one)", said)
+        refused = self.run_on("render", "-o", self.out, *QUICK, "--shutter", "-0.25,0.25", check=2)
+        self.assertIn("--shutter needs a frame", refused.stderr)
         settings = UsdRender.Settings.Define(self.stage, "/Settings")
         settings.CreateDisableMotionBlurAttr(True)
         self.save()
