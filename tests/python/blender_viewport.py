@@ -1,6 +1,7 @@
 """Tests the add-on's viewport with stand-ins for Blender's window: views, edits, exports and the end. Needs bpy."""
 
 import os
+import signal
 import time
 import types
 import unittest
@@ -204,9 +205,13 @@ class Viewport(Installed):
         self.assertFalse(os.path.exists(folder))
 
     def test_a_program_that_ends_is_a_fault_and_not_a_crash(self):
+        # As in Blender; Python as a program ignores this signal.
+        self.addCleanup(signal.signal, signal.SIGPIPE, signal.signal(signal.SIGPIPE, signal.SIG_DFL))
         self.update()
         self.show()
         self.view._server._process.kill()
+        self.view._server._process.wait()
+        self.assertIsNone(self.view._server.send("stop"))
         self.until(lambda: self.view._live.fault is not None)
         self.update()
         self.view.tick()

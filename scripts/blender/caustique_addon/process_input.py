@@ -15,6 +15,7 @@ class ProcessInput:
 
     def start(self, command, **options):
         """Start a process that reads this input. Returns the `subprocess.Popen`."""
+        # In a process group of its own, else a Ctrl-C in Blender's terminal would end it.
         with self._there:
             return subprocess.Popen(command, stdin=self._there, start_new_session=True, **options)
 

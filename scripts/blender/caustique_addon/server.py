@@ -11,6 +11,7 @@ import threading
 import numpy
 
 from .fault import Fault
+from .process_input import ProcessInput
 
 #: The version of the protocol that this module speaks.
 PROTOCOL = 1
@@ -26,9 +27,8 @@ class Server:
     def __init__(self, program, threads, answered, shown):
         self._answered, self._shown, self._next, self._log = answered, shown, 0, collections.deque(maxlen=_MAX_LOG_LINES)
         try:
-            # In a process group of its own, else a Ctrl-C in Blender's terminal would end it.
-            self._process = subprocess.Popen([program, "serve", *threads], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                                             stderr=subprocess.PIPE, start_new_session=True)
+            self._input = ProcessInput()
+            self._process = self._input.start([program, "serve", *threads], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         except OSError as error:
             raise Fault(f"{program} does not run: {error.strerror}", "choose the program in the add-on's preferences") from error
         self._threads = [threading.Thread(target=work, daemon=True) for work in (self._read, self._read_log)]
@@ -40,9 +40,8 @@ class Server:
         self._next += 1
         line = json.dumps({"command": command, "id": self._next, **fields})
         try:
-            self._process.stdin.write(line.encode() + b"\n")
-            self._process.stdin.flush()
-        except (OSError, ValueError):  # it has ended, or was closed
+            self._input.send(line.encode() + b"\n")
+        except OSError:  # it has ended, or was closed
             return None
         return self._next
 
@@ -52,10 +51,7 @@ class Server:
 
     def close(self):
         """End the program. It ends by itself when its input is closed, so nothing waits here."""
-        try:
-            self._process.stdin.close()
-        except OSError:
-            pass
+        self._input.close()
         threading.Thread(target=self._end, daemon=True).start()
 
     def _end(self):
