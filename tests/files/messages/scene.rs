@@ -137,9 +137,14 @@ pub fn said() -> String {
     for (what, bytes) in containers() {
         said.case(what, &messages_of(&bytes, &ReadOptions::default()));
     }
-    let rest = ReadOptions { pose: Pose::Rest, ..ReadOptions::default() };
-    let stage = caustique::scene::usd::read(Path::new("a.usda"), &rest, 0.0, &Stop::default());
-    said.case("the rest pose of a stage", &[message(&stage.expect_err("it has none"))]);
+    let stages = [
+        ("the rest pose of a stage", ReadOptions { pose: Pose::Rest, ..ReadOptions::default() }),
+        ("a blurred stage without a frame", ReadOptions { shutter: Some([0.0, 0.5]), ..ReadOptions::default() }),
+    ];
+    for (what, options) in stages {
+        let stage = caustique::scene::usd::read(Path::new("a.usda"), &options, 0.0, &Stop::default());
+        said.case(what, &[message(&stage.expect_err("it is refused"))]);
+    }
     let missing = read(Path::new("/nowhere/a.glb"), &ReadOptions::default()).expect_err("it is not there");
     said.case("no such file", &[message(&missing)]);
     said.0
