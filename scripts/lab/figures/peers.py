@@ -72,7 +72,8 @@ def compare(scene, names):
         for peer, figures in theirs.items()
     }
     shown, titles = pictures(scene, peers, cell, reference)
-    strip(cell["scene"], shown)
+    if cell["core_seconds"].keys() - {"auto"}:  # another renderer has a picture
+        strip(cell["scene"], shown)
     figures = {"auto": ours, **theirs}
     return {
         "scene": cell["scene"],

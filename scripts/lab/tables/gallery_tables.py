@@ -6,6 +6,8 @@ from .markdown import digits, table
 
 WIDTH = 120
 
+# The beginning of notes on scenes that a driver cannot translate.
+UNTRANSLATED = "no faithful translation: "
 MEASURES = {"relmse_trimmed": "relMSE, trimmed", "flip": "FLIP", "grain_trimmed": "grain, trimmed"}
 NAMES = {
     "auto": "caustique",
@@ -27,13 +29,27 @@ NOTES = {
 }
 
 
-def peers(figures):
-    """Our errors over those of the other renderers."""
+def losses(figures):
+    """The scenes on which another renderer has less error, the greatest loss first."""
     values = figures.one("peers")
-    rows = []
-    for peer, of in values["summary"].items():
-        for key, (mean, worst, better, count) in of.items():
-            rows.append([NAMES.get(peer, peer), MEASURES[key], f"{mean:.2f}", f"{worst:.2f}", f"{better} of {count}"])
+    found = []
+    for row in values["rows"]:
+        for key in values["compared"]:
+            ratio, best = max(((of[key], peer) for peer, of in row["ratios"].items()), default=(0, None))
+            if ratio > 1:
+                found.append((ratio, row["scene"], key, best))
+    rows = [[scene, MEASURES[key], NAMES.get(best, best), f"{ratio:.2f}"] for ratio, scene, key, best in sorted(found)[::-1]]
+    return table(["scene", "of", "best", "caustique over it"], rows)
+
+
+def peers(figures):
+    """Our errors over those of the other renderers, the greatest mean first."""
+    values = figures.one("peers")
+    found = [(peer, key, *of) for peer, all_of in values["summary"].items() for key, of in all_of.items()]
+    rows = [
+        [NAMES.get(peer, peer), MEASURES[key], f"{mean:.2f}", f"{worst:.2f}", f"{better} of {count}"]
+        for peer, key, mean, worst, better, count in sorted(found, key=lambda one: -one[2])
+    ]
     return table(["caustique over", "of", "geometric mean", "worst", "better on"], rows)
 
 
@@ -50,11 +66,26 @@ def plain(note):
     return note
 
 
+def _is_translated(row):
+    """Whether any other renderer has a picture of a row's scene."""
+    return bool(row["core_seconds"].keys() - {"auto"})
+
+
+def untranslated(figures):
+    """The scenes of which no other renderer has a picture, and why."""
+    values, rows = figures.one("peers"), []
+    for row in values["rows"]:
+        if not _is_translated(row):
+            reasons = dict.fromkeys(note.removeprefix(UNTRANSLATED) for note in row["notes"].values())
+            rows.append([row["scene"], *map(digits, row["figures"]["auto"]), "; ".join(reasons)])
+    return table(["scene", *(f"caustique's {MEASURES[key]}" for key in values["compared"]), "why"], rows)
+
+
 def gallery(figures):
-    """A picture and a table for every scene."""
+    """A picture and a table for every scene of which another renderer has a picture."""
     values = figures.one("peers")
     parts = []
-    for row in values["rows"]:
+    for row in filter(_is_translated, values["rows"]):
         titles = ", ".join(row["titles"])
         name = row["scene"]
         picture = f"![{name}](gallery/{name.replace('/', '-')}.jpg)"
@@ -71,4 +102,4 @@ def gallery(figures):
     return "\n".join(parts)
 
 
-KINDS = {"peers": peers, "gallery": gallery}
+KINDS = {"losses": losses, "peers": peers, "untranslated": untranslated, "gallery": gallery}
