@@ -1,5 +1,6 @@
 //! The second step: whether a request fits its scene and the memory, found before anything is rendered.
 
+use super::finish;
 use super::layers;
 use super::memory::MemoryCheck;
 use super::request::{MethodRequest, PictureRequest, Request};
@@ -40,12 +41,13 @@ pub fn check_picture(picture: &PictureRequest<'_>, path: &Path, scene: &Scene) -
     Ok(Checked { camera, settings })
 }
 
-/// Checks a render before it starts: its picture, its layers and its memory.
+/// Checks a render before it starts: its picture, its network, its layers and its memory.
 ///
 /// # Errors
-/// Errors of [`check_picture`]; the scene has no such layer; the render does not fit into memory.
+/// Errors of [`check_picture`]; there is no such network; the scene has no such layer; the render does not fit into memory.
 pub(super) fn check(request: &Request<'_>, scene: &Scene) -> Result<Checked> {
     let checked = check_picture(&request.picture, &request.scene.path, scene)?;
+    request.finish_of(&checked.settings).map_or(Ok(()), finish::check)?;
     let (shape, finishes) = (layer_shape(&checked.settings, scene), request.finish.is_some());
     layers::check(&request.layers, &shape, finishes, true)?;
     layers::check_names(&request.layers, &shape, finishes, request.naming)?;

@@ -83,7 +83,6 @@ pub fn render_loaded(request: Request<'_>, loaded: &Loaded, observer: &mut dyn O
     let lobes = request.layers.wants_lobes();
     let method = request.picture.method.map_settings(move |settings| Settings { lobes, ..settings });
     let mut request = Request { picture: PictureRequest { method, ..request.picture }, ..request };
-    request.finish.as_ref().map_or(Ok(()), finish::check)?;
     observer.accept(&loaded.scene)?;
     let Checked { camera, settings } = check::check(&request, &loaded.scene)?;
     let view = View::new(&loaded.scene, &camera);

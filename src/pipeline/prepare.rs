@@ -57,7 +57,7 @@ fn open_finish(
     settings: Settings,
     observer: &mut dyn Observer,
 ) -> Result<(Option<OpenFinish>, Settings)> {
-    let Some(wanted) = request.finish.as_ref().filter(|_| !settings.is_shard()) else { return Ok((None, settings)) };
+    let Some(wanted) = request.finish_of(&settings) else { return Ok((None, settings)) };
     let mut finish = finish::open(wanted, Some(settings.levels.count))?;
     observer.event(Event::FinishOpened { missing: finish.missing.as_ref() });
     let Some(time) = settings.time else { return Ok((Some(finish), settings)) };

@@ -110,6 +110,14 @@ pub struct Request<'a> {
     pub resume: Option<PathBuf>,
 }
 
+impl Request<'_> {
+    /// How a render with these settings is finished; `None`: the picture stays the unfinished estimate, or is a shard, which
+    /// is finished after the merge.
+    pub(super) fn finish_of(&self, settings: &Settings) -> Option<&FinishRequest> {
+        self.finish.as_ref().filter(|_| !settings.is_shard())
+    }
+}
+
 /// Where and how often the checkpoint of a render is saved.
 #[derive(Clone, Debug)]
 pub struct Saving {

@@ -272,6 +272,10 @@ fn a_missing_network_is_found_before_any_work() {
     let outcome = folder.run("render scene.glb -o out.exr --iterations 100000 --model none.onnx --progress plain");
     assert_eq!(outcome.code, Some(1), "{}", outcome.stderr);
     assert!(outcome.stderr.contains("none.onnx") && !outcome.stderr.contains("method:"), "{}", outcome.stderr);
+    // A shard is finished after the merge, perhaps on another machine.
+    let shard = "render scene.glb -o out.exr --shard 0/2 --iterations 2 --width 16 --height 12 --photons 500";
+    let outcome = folder.run(&format!("{shard} --method sppm --model none.onnx"));
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
 }
 
 /// If the network fails when it runs, the unfinished render is written. Its stride is changed to 3, which does not fit
