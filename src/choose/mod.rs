@@ -63,16 +63,17 @@ pub fn choose(view: View<'_>, settings_of: impl Fn(Candidate) -> Option<Settings
 }
 
 fn choose_untimed(view: View<'_>, settings_of: &impl Fn(Candidate) -> Option<Settings>, stop: &Stop) -> Option<Choice> {
-    let gathering = settings_of(Candidate::GATHERING)?;
+    let settings_of_pilot = |candidate| Some(Settings { stop: stop.clone(), ..settings_of(candidate)? });
+    let gathering = settings_of_pilot(Candidate::GATHERING)?;
     let clock = Clock::start();
     let pilot = Pilot::new(view, &gathering);
     let limit = gathering.time.map(|seconds| MAX_PILOT_TIME_SHARE * seconds);
     let late = || limit.is_some_and(|limit| clock.seconds() > limit);
-    let (effects, effects_seconds) = if late() { (Vec::new(), 0.0) } else { pilot.weigh_effects(stop) };
+    let (effects, effects_seconds) = if late() { (Vec::new(), 0.0) } else { pilot.weigh_effects() };
     let (pilots, reason) = if late() {
         (Vec::new(), Some("the time for a pilot is over"))
     } else {
-        pilot.run(effects_seconds, settings_of, stop, &late)
+        pilot.run(effects_seconds, &settings_of_pilot, &late)
     };
     let chosen = pilots.iter().find(|pilot| pilot.chosen);
     let candidate = chosen.map_or_else(|| candidate_without_pilot(view.scene, settings_of), |chosen| chosen.candidate);

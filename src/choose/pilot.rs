@@ -6,7 +6,6 @@ use crate::camera::Camera;
 use crate::plan::{Effect, Presence};
 use crate::render::{Candidate, Cost, Counts, Method, Proxy, Settings};
 use crate::scene::{Scene, View};
-use crate::stop::Stop;
 
 /// Share of the render's work that the pilot (a proxy render in a small picture) and the measurement of effects may take
 /// together.
@@ -121,9 +120,8 @@ impl<'a> Pilot<'a> {
 
     /// Measures what each effect of the scene adds to the picture. Also returns the predicted core-seconds of the
     /// measurement. If the render is too short for all of it, measures light effects only, or nothing.
-    pub fn weigh_effects(&self, stop: &Stop) -> (Vec<WeighedEffect>, f64) {
+    pub fn weigh_effects(&self) -> (Vec<WeighedEffect>, f64) {
         let settings = weights::settings(self.gathering, EFFECTS_PHOTON_SHARE);
-        let settings = Settings { stop: stop.clone(), ..settings };
         let pixels = EFFECTS_PIXELS.min(self.pixels);
         let picture_seconds =
             self.cost.iteration_seconds(Candidate::GATHERING, &settings, pixels) * weights::ITERATIONS as f64;
@@ -154,7 +152,6 @@ impl<'a> Pilot<'a> {
         &self,
         effects_seconds: f64,
         settings_of: &impl Fn(Candidate) -> Option<Settings>,
-        stop: &Stop,
         late: &dyn Fn() -> bool,
     ) -> (Vec<PilotResult>, Option<&'static str>) {
         let scene = self.view.scene;
@@ -174,7 +171,6 @@ impl<'a> Pilot<'a> {
         let Some(size) = self.size(&settings, effects_seconds) else {
             return (Vec::new(), Some("the render is too short to try others"));
         };
-        let settings = Settings { stop: stop.clone(), ..settings };
         (chosen_and_usual(self.results(&size, guided, &settings, settings_of, late)), None)
     }
 

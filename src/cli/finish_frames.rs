@@ -8,7 +8,7 @@ use super::say;
 use super::signals::Interrupt;
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::image::exr;
-use caustique::options::{FinishOptions, Frames, files_of_frames, path_of_frame};
+use caustique::options::{FinishOptions, Frames, files_of_frames, no_frames, path_of_frame};
 use caustique::pipeline::OpenFinish;
 use caustique::pipeline::temporal::FrameFiles;
 use caustique::render::Clock;
@@ -117,9 +117,7 @@ impl FrameFinish<'_> {
     /// There are no files, or the user has asked for a frame that has none.
     fn numbers(&self, paths: &BTreeMap<u32, PathBuf>) -> Result<Vec<u32>> {
         let Some(frames) = self.frames else {
-            let error = Error::new(ErrorKind::Io, self.input.display(), "no file has such a name");
-            let error = error.hint("'####' stands for the number of the frame, as in shot.0001.exr");
-            return if paths.is_empty() { Err(error) } else { Ok(paths.keys().copied().collect()) };
+            return if paths.is_empty() { Err(no_frames(self.input)) } else { Ok(paths.keys().copied().collect()) };
         };
         let (there, missing): (Vec<u32>, Vec<u32>) = frames.iter().partition(|frame| paths.contains_key(frame));
         match missing.first() {

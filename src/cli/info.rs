@@ -102,7 +102,7 @@ fn image_text(path: &Path, set: &LayerSet, object: &Value) -> String {
         let name = if layer.name.is_empty() { "(beauty)" } else { &layer.name };
         // Blender's names have the name of the view layer in front.
         let plain = layer.name.strip_prefix("ViewLayer.").unwrap_or(&layer.name);
-        let known = describe(plain).map(|known| format!("{} [{}]", known.meaning, known.unit));
+        let known = describe(plain).map(|known| known.to_string());
         let [name, components] = [name, &components.concat()].map(printable);
         text += format!("  {name:<18} {components:<8} {}", known.unwrap_or_default()).trim_end();
         text.push('\n');

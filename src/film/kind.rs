@@ -2,6 +2,7 @@
 //! the page for compositors read it; `output.rs` computes the values.
 
 use crate::transport::LobeLayer;
+use std::fmt;
 
 /// Prefix of the name of a layer with the light of one light group.
 pub const LIGHT_GROUP: &str = "LightGroup_";
@@ -438,6 +439,13 @@ pub struct LayerDescription {
     pub unit: &'static str,
     /// Meaning of the layer's values, in words.
     pub meaning: &'static str,
+}
+
+impl fmt::Display for LayerDescription {
+    /// Writes `meaning [unit]`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} [{}]", self.meaning, self.unit)
+    }
 }
 
 /// Description of a layer by its plain name; `None` for an unknown name.

@@ -1,6 +1,7 @@
 //! Frames of an animation, and frame numbers in file names.
 
 use super::number::whole;
+use crate::error::{Error, ErrorKind};
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -99,6 +100,12 @@ pub fn files_of_frames(pattern: &Path) -> std::io::Result<BTreeMap<u32, PathBuf>
         found.extend(digits.filter_map(|digits| digits.parse().ok()).find_map(of_frame));
     }
     Ok(found)
+}
+
+/// The error that no file has the name `pattern`.
+pub fn no_frames(pattern: &Path) -> Error {
+    let error = Error::new(ErrorKind::Io, pattern.display(), "no file has such a name");
+    error.hint("'####' stands for the number of the frame, as in shot.0001.exr")
 }
 
 /// Whether a file name is certainly meant as a pattern. A single `#` is not, because it may be part of the name.

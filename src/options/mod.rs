@@ -19,7 +19,7 @@ mod values;
 pub use check::takes;
 pub use clap::ValueEnum;
 pub use finish::FinishOptions;
-pub use frames::{Frames, files_of_frames, is_pattern, path_of_frame};
+pub use frames::{Frames, files_of_frames, is_pattern, no_frames, path_of_frame};
 pub use parse::{InvalidOption, one_of, parse};
 pub use render::{RenderOptions, SizeOptions};
 pub use run::RunOptions;

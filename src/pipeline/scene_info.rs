@@ -1,4 +1,4 @@
-//! What a scene contains, as JSON: the object of `caustique info --json` and of Python's `Scene.info`.
+//! Objects, materials, lights and the rest of a scene as JSON, for `caustique info --json` and Python's `Scene.info`.
 
 use crate::light::{Emitter, Pattern};
 use crate::math::Vec3;

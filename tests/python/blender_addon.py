@@ -325,16 +325,16 @@ class Stops(Installed):
         return found, time.monotonic() - pressed[0]
 
     def first_iteration(self):
-        """Render until the program tells an iteration, then press Esc. Returns the iteration's number."""
-        told = []
+        """Render until the program reports an iteration, then press Esc. Returns the iteration's number."""
+        reported = []
 
-        def tells(run):
+        def reports(run):
             if run and run.progress:
-                told.append(run.progress["iteration"])
-            return bool(told)
+                reported.append(run.progress["iteration"])
+            return bool(reported)
 
-        self.stop_when(tells)
-        return told[0]
+        self.stop_when(reports)
+        return reported[0]
 
     def test_in_the_middle_the_picture_so_far_is_kept(self):
         self.passes("use_pass_z", "noisy")

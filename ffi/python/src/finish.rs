@@ -7,7 +7,7 @@ use crate::work::{Caller, work};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::take_plain_names;
 use caustique::image::exr::ATTRIBUTE;
-use caustique::options::files_of_frames;
+use caustique::options::{files_of_frames, no_frames};
 use caustique::pipeline::finish::open;
 use caustique::pipeline::temporal::FrameFiles;
 use caustique::pipeline::{FinishRequest, OpenFinish, RenderedFile, write_finish};
@@ -67,8 +67,7 @@ pub fn finish_frames(
     let request = finish_request("finish_frames", denoise, model)?;
     let paths = py.detach(|| files_of_frames(&pattern)).map_err(|cause| raised(Error::io(&pattern, &cause)))?;
     if paths.is_empty() {
-        let error = Error::new(ErrorKind::Io, pattern.display(), "no file has such a name");
-        return Err(raised(error.hint("'####' stands for the number of the frame, as in shot.0001.exr")));
+        return Err(raised(no_frames(&pattern)));
     }
     let mut numbers = frames.unwrap_or_else(|| paths.keys().copied().collect());
     if let Some(missing) = numbers.iter().find(|number| !paths.contains_key(number)) {

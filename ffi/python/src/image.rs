@@ -4,7 +4,7 @@ use crate::error::{raised, usage};
 use crate::keywords::choice;
 use crate::value::{to_json, to_python};
 use caustique::error::{Error, ErrorKind};
-use caustique::film::{Layer, LayerDescription, LayerSet, Plane, Sample, describe};
+use caustique::film::{Layer, LayerSet, Plane, Sample, describe};
 use caustique::image::exr::{self, Attributes};
 use caustique::image::png;
 use caustique::image::tonemap::ToneMap;
@@ -113,13 +113,13 @@ impl Image {
         }
     }
 
-    /// What each layer holds, {layer: "meaning [unit]"}, without layers of other programs.
+    /// Meaning and unit of each layer, {layer: "meaning [unit]"}; layers of other programs are left out.
     #[getter]
     fn descriptions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
         for layer in &self.set.layers {
-            if let Some(LayerDescription { meaning, unit, .. }) = describe(&layer.name) {
-                all.set_item(&layer.name, format!("{meaning} [{unit}]"))?;
+            if let Some(description) = describe(&layer.name) {
+                all.set_item(&layer.name, description.to_string())?;
             }
         }
         Ok(all)
@@ -191,8 +191,8 @@ impl Image {
     /// exposure      of the PNG, stops
     /// tonemap       of the PNG: 'agx', 'filmic', 'neutral' or 'srgb'
     #[pyo3(signature = (
-        path, *, compression = "zip", half = false, multi_part = false, exr_naming = "plain", colorspace = "rec709", exposure = 0.0,
-        tonemap = "agx"
+        path, *, compression = "zip", half = false, multi_part = false, exr_naming = "plain", colorspace = "rec709",
+        exposure = 0.0, tonemap = "agx"
     ))]
     #[expect(clippy::too_many_arguments, reason = "they are those of Python's signature")]
     fn save(

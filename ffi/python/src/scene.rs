@@ -174,7 +174,7 @@ impl Scene {
         delivered(py, delivery)
     }
 
-    /// What the scene contains: the object of `caustique info --json`, a dict.
+    /// Objects, materials, lights and the rest of the scene: what `caustique info --json` prints, as a dict.
     fn info<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         to_python(py, &scene_info(&self.path, &self.loaded.scene))
     }

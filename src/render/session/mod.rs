@@ -351,6 +351,7 @@ mod tests {
             assert!(session.is_finished() && session.iterations() == 1);
         }
     }
+
     /// A render that the user has stopped before it starts makes no pixels, and still has a picture.
     #[test]
     fn a_render_that_is_stopped_at_once_has_a_black_picture() {

@@ -59,6 +59,7 @@ pub fn is_stage(path: &Path) -> bool {
 /// file fails, or `stop` ends the conversion.
 pub fn read(path: &Path, options: &ReadOptions, after_frame: f64, stop: &Stop) -> Result<Description> {
     check_choices(path, options)?;
+    check_blur(path, options)?;
     let converter = Converter::new(path)?;
     let glb = converter.folder.path().join("stage.glb");
     let mut arguments: Vec<OsString> = vec!["-o".into(), glb.clone().into()];
@@ -82,7 +83,7 @@ pub fn read(path: &Path, options: &ReadOptions, after_frame: f64, stop: &Stop) -
     Ok(description)
 }
 
-/// Rejects options that choose among the parts of a glTF file, and motion blur without a frame.
+/// Rejects options that choose among the parts of a glTF file.
 fn check_choices(path: &Path, options: &ReadOptions) -> Result<()> {
     let ReadOptions { scene, animation, variant, pose, .. } = options;
     let given = [
@@ -91,16 +92,18 @@ fn check_choices(path: &Path, options: &ReadOptions) -> Result<()> {
         ("variant", variant.is_some()),
         ("pose rest", *pose == Pose::Rest),
     ];
-    let Some((option, _)) = given.into_iter().find(|(_, given)| *given) else {
-        if options.frame.is_none() && options.shutter.is_some_and(|[open, close]| open < close) {
-            let cause = "--shutter needs a frame: without one, a stage is read at no time, and nothing moves";
-            let error = Error::new(ErrorKind::Usage, path.display(), cause);
-            return Err(error.hint("give one by --frames, such as --frames 1"));
-        }
-        return Ok(());
-    };
+    let Some((option, _)) = given.into_iter().find(|(_, given)| *given) else { return Ok(()) };
     let error = Error::new(ErrorKind::Usage, path.display(), format!("--{option} is for glTF files, not for stages"));
     Err(error.hint("choose what the stage shows in the stage itself; --frames chooses the time"))
+}
+
+/// Rejects motion blur without a frame.
+fn check_blur(path: &Path, options: &ReadOptions) -> Result<()> {
+    if options.frame.is_some() || options.shutter.is_none_or(|[open, close]| open >= close) {
+        return Ok(());
+    }
+    let cause = "--shutter needs a frame: without one, a stage is read at no time, and nothing moves";
+    Err(Error::new(ErrorKind::Usage, path.display(), cause).hint("give one by --frames, such as --frames 1"))
 }
 
 /// The stage's RenderSettings as options of `caustique render`.
