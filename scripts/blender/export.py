@@ -128,8 +128,9 @@ def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None, onl
 def selection(scene, names):
     """The names of the objects to export after a change of the objects `names`: also those that share a transmissive
     material with them, because whether it is a solid depends on all its meshes. None if one of them has instances."""
-    instances = [i for i in bpy.context.evaluated_depsgraph_get().object_instances if i.is_instance]
-    instanced = {thing.original.name for i in instances for thing in (i.object, i.parent)}
+    # Blender removes an instance when the next one is asked for.
+    instanced = {thing.original.name for i in bpy.context.evaluated_depsgraph_get().object_instances if i.is_instance
+                 for thing in (i.object, i.parent)}
     worn = {thing.name: {m.name for m in surfaces.materials_of(thing) if m is not None and may_transmit(m)}
             for thing in scene.objects if thing.type not in {"LIGHT", "CAMERA", "EMPTY"}}
     found, size = set(names), 0

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import threading
 import time
 import types
 import unittest
@@ -70,11 +71,10 @@ class Viewport(Installed):
         self.view.want(camera.matrix_world.inverted(), window, 0.0, _SIZE)
 
         def is_there():
-            picture = self.view._live.picture
-            live = self.view._live
-            return (picture is not None and live._ready and picture.about["id"] == live._sent and not live.needs_export
-                    and not self.view._due and self.view._exporting is None and picture.about["iteration"] == iterations
-                    and not picture.about["coarse"])
+            if not self.view.is_current():
+                return False
+            about = self.view._live.picture.about
+            return about["iteration"] == iterations and not about["coarse"]
 
         self.until(is_there)
         return self.view._live.picture.pixels
@@ -187,6 +187,102 @@ class Viewport(Installed):
         self.assertEqual((self.view._exports, self.view._parts), (3, []))
         self.assertTrue(numpy.array_equal(after, self.fresh()))
 
+    def test_changes_that_move_or_hide_copies_text_and_curves_are_seen(self):
+        group = bpy.data.collections.new("group")
+        copied = self.ball("copied", at=(0, 1, 0.3), radius=0.2)
+        self.scene.collection.objects.unlink(copied)
+        group.objects.link(copied)
+        empty = self.put("copies", None, (1, 0, 0))
+        empty.instance_type, empty.instance_collection = "COLLECTION", group
+        letters = bpy.data.curves.new("text", "FONT")
+        letters.body = "abc"
+        text = self.put("text", letters, (-1.5, -1, 0.3))
+        lamp = bpy.data.lights.new("area", "AREA")
+        lamp.energy = 50
+        area = self.put("area", lamp, (0, 0, 3))
+        self.update()
+        before = self.show()
+
+        def paint(name, colour):
+            material = bpy.data.objects[name].active_material
+            shader = next(n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
+            shader.inputs["Base Color"].default_value = (*colour, 1)
+
+        def paint_and_scale():
+            paint("plane", (0.9, 0.1, 0.1))
+            self.update()
+            area.scale = 3, 3, 1  # while the plane waits for its export
+
+        for change in (lambda: setattr(empty, "location", (1.3, -0.5, 0)), lambda: setattr(text, "location", (-1, 0, 0.3)),
+                       lambda: paint("copied", (0, 1, 0)), lambda: setattr(text, "visible_camera", False),
+                       lambda: setattr(lamp, "color", (1, 0.2, 0.2)), paint_and_scale):
+            change()
+            self.update()
+            after, fresh = self.show(), self.fresh()
+            self.assertFalse(numpy.array_equal(before, after), "the change is not seen")
+            # Up to the rounding of places.
+            noise, seen = (numpy.abs(fresh - other).sum() for other in (after, before))
+            self.assertLess(noise, 0.2 * seen)
+            before = after
+
+    def test_changes_at_the_end_of_an_export_are_not_lost(self):
+        self.update()
+        load, take = self.view._live.load, self.view._take_scene
+        loaded, go_on = threading.Event(), threading.Event()
+
+        def slowly(path, places):
+            take(path, places)
+            loaded.set()
+            go_on.wait(_PATIENCE_SECONDS)
+
+        with mock.patch.object(self.view, "_take_scene", slowly):
+            self.until(loaded.is_set)
+        self.settings.iterations = 3  # after the export has been loaded, and before the main thread knows it
+        with mock.patch.object(self.view._live, "load", mock.Mock(wraps=load)) as loads:
+            self.update()
+            go_on.set()
+            self.show(iterations=3)
+        self.assertEqual((loads.call_count, self.view._exports), (1, 1))
+
+        # An edit that fails while single objects begin to be exported: the whole scene follows.
+        job = part_of_addon("handoff").Job
+        copy = job.copy
+
+        def failing(this):
+            self.view._live.needs_export = True
+            return copy(this)
+
+        bpy.data.objects["plane"].data.update()
+        bpy.data.objects["plane"].update_tag(refresh={"DATA"})
+        self.update()
+        self.assertEqual(self.view._due, {"plane"})
+        with mock.patch.object(job, "copy", failing):
+            self.until(lambda: self.view._exports == 2)
+        self.until(lambda: self.view._exports == 3)
+        self.show(iterations=3)
+
+    def test_a_failed_export_is_said_until_the_next_one(self):
+        self.update()
+        self.show()
+        handoff = part_of_addon("handoff")
+        with mock.patch.object(handoff.Job, "run", side_effect=OSError("no space")):
+            bpy.data.objects["plane"].update_tag(refresh={"DATA"})
+            self.update()
+            self.until(lambda: self.view._live.fault is not None and self.view._exporting is None)
+        self.view._live.shown(self.view._live.picture)  # a further picture of the older scene
+        self.assertIn("no space", self.view._live.fault[0])
+        self.assertFalse(self.view.is_current())
+        bpy.data.objects["ball"].location.x += 0.1
+        self.update()
+        self.show()
+        self.assertIsNone(self.view._live.fault)
+        self.assertEqual((self.view._exports, self.view._parts), (3, []))
+
+    def test_the_scene_of_another_window_is_not_taken_for_its_own(self):
+        other = bpy.data.scenes.new("other")
+        bpy.context.window.scene = other
+        self.assertIn("ball", self.view._scene_state().places)
+
     def test_settings_apply_without_an_export(self):
         self.update()
         self.show()
@@ -285,6 +381,35 @@ class Cameras(Installed):
         state.edit({"a": [0] * 16})
         state.answered({"event": "error", "id": 4, "message": "it cannot", "hint": ""})
         self.assertTrue(state.needs_export)
+
+    def test_a_picture_of_an_older_scene_is_never_taken_for_the_current_one(self):
+        live = part_of_addon("live")
+        sent, seen = [], []
+
+        def send(command, **fields):
+            # Another thread looks while the command is on its way, as on a busy machine.
+            looks = threading.Thread(target=lambda: seen.append(state.is_current()))
+            looks.start()
+            looks.join(0.1)
+            sent.append(command)
+            return len(sent)
+
+        def show(number):
+            state.shown(mock.Mock(about={"id": number, "iteration": 1, "iterations": 1, "coarse": False}))
+
+        state = live.Live(send)
+        state.want({"width": 1})
+        for load, view in ((1, 2), (3, 4)):
+            state.load("a.glb", [])
+            state.needs_export = False
+            state.answered({"event": "loaded", "id": load})
+            self.assertEqual(len(sent), view)
+            if view > 2:
+                show(2)  # the last one of the older scene
+            self.assertFalse(state.is_current())
+            show(view)
+            self.assertTrue(state.is_current())
+        self.assertEqual(seen, [False] * 4)
 
 
 if __name__ == "__main__":

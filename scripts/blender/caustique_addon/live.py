@@ -27,16 +27,19 @@ class Live:
         self.picture = None  # the last `server.Picture`
         self.message, self.fault = "", None
         self.needs_export = True
-        self._wanted = self._pending = None  # the view to show; the number of the view whose first picture is awaited
+        self._wanted = self._begun = None  # the view to show; the one that was sent last
+        self._sent = self._pending = None  # the number of the view that was sent last; the same until its first picture
         self._ready, self._edits = False, set()  # whether a scene is loaded; numbers of edits and loads under way
         self._changed = False  # whether a picture or a message is new
         self._loading = None
         self._coarse = _COARSE
+        self._fault_lasts = False  # whether the fault concerns the scene, so that pictures of the older one do not hide it
 
     def load(self, path, arguments):
         """Load an exported scene."""
         with self._lock:
-            self._ready, self._pending, self.fault, self._edits = False, None, None, set()
+            self._ready, self._pending, self._edits = False, None, set()
+            self.fault, self._fault_lasts = None, False
             self._loading = self._send("load", scene=path, arguments=arguments)
 
     def edit(self, places, files=()):
@@ -87,13 +90,16 @@ class Live:
             self.needs_export = True  # the whole scene, because it cannot be edited so
         else:
             self.fault = answer["message"], answer.get("hint") or ""
+            self._fault_lasts = number is None or number == self._loading
             if number == self._pending:
                 self._go_on()
 
     def shown(self, picture):
         """Take a picture, from the thread that reads."""
         with self._lock:
-            self.picture, self._changed, self.fault = picture, True, None
+            self.picture, self._changed = picture, True
+            if not self._fault_lasts:
+                self.fault = None
             about = picture.about
             if about["coarse"]:
                 self._coarse = coarser(self._coarse, about["seconds"])
@@ -107,6 +113,12 @@ class Live:
         self._pending = None
         if self._ready and self._wanted != self._begun:
             self._begin()
+
+    def is_current(self):
+        """Whether the last picture shows the scene and the view that were sent last."""
+        with self._lock:
+            return (self._ready and self.picture is not None and self.picture.about["id"] == self._sent
+                    and self._begun == self._wanted and not self.needs_export and self.fault is None)
 
     def take_change(self):
         """Whether a picture or a message is new since the last call."""

@@ -21,7 +21,10 @@ from .fault import Cancelled, Fault, fault_from_error
 _TIMER_SECONDS = 0.05
 _QUIET_SECONDS = 0.4  # without changes, before the scene is exported again
 _MATTERS = (bpy.types.Curve, bpy.types.Image, bpy.types.Texture, bpy.types.Collection, bpy.types.MetaBall)
-_PLACED = ("MESH", "LIGHT")
+#: Types of objects that have a place in the picture.
+_PLACED = frozenset({"MESH", "LIGHT", "CURVE", "SURFACE", "FONT", "META", "CURVES", "POINTCLOUD", "VOLUME"})
+_VISIBILITY = ("visible_camera", "visible_diffuse", "visible_glossy", "visible_transmission", "visible_volume_scatter",
+               "visible_shadow", "is_shadow_catcher", "is_holdout")
 _open = weakref.WeakSet()
 
 
@@ -35,7 +38,7 @@ class Viewport:
         self._folder = tempfile.mkdtemp(prefix="caustique-", dir=bpy.app.tempdir)
         self._exporting, self._closed, self._exports = None, False, 0
         self._changed_at = -_QUIET_SECONDS  # the first export waits for nothing
-        self._state = _State({}, {}, set())  # what the program shows
+        self._state = _NOTHING  # what the program shows
         self._due = set()  # names of changed objects, to be exported again
         self._exported = {}  # {object: its matrix in the exported files, or by an edit since}
         self._moved = {}  # {object: its matrix by an edit since its export}
@@ -58,7 +61,8 @@ class Viewport:
             if self._path is not None and self._exporting is None:
                 self._load()
         state = _state_of(depsgraph)
-        same = state.places.keys() == self._state.places.keys() and state.worn == self._state.worn
+        same = (state.places.keys() == self._state.places.keys() and state.worn == self._state.worn
+                and state.visible == self._state.visible)
         names = _concerned(depsgraph, state) if same else None
         if names is None or not names <= self._exported.keys():
             self._live.needs_export = True
@@ -70,11 +74,16 @@ class Viewport:
             self._move(state)
 
     def _move(self, state):
-        """Place the objects that have moved. Those that have to be exported again are due."""
+        """Place the objects that have moved. Those that have to be exported again are due, and the whole scene is after a move
+        of an object that the program does not know by its name, or on which others depend."""
         edits = {}
         for name, place in state.places.items():
             before, known = self._state.places[name], self._exported.get(name)
-            if known is None or numpy.array_equal(place, before):
+            if numpy.array_equal(place, before):
+                continue
+            if known is None or name in state.whole:
+                self._live.needs_export = True
+                self._changed_at = time.monotonic()
                 continue
             changed = live.moved(before, place, known, name in state.lights)
             if changed is None:
@@ -109,7 +118,16 @@ class Viewport:
             engine.unbind_display_space_shader()
             gpu.state.blend_set("NONE")
         fault = self._live.fault
-        return self._live.message, None if fault is None else Fault(*fault)
+        return self._message(), None if fault is None else Fault(*fault)
+
+    def _message(self):
+        if self._exporting is not None:
+            return "caustique: exporting"
+        return self._live.message if self.is_current() else "caustique: updating"
+
+    def is_current(self):
+        """Whether the last picture shows the scene with all changes, through the view that was asked for last."""
+        return self._exporting is None and not self._due and self._live.is_current()
 
     def close(self):
         """End the program and remove the exported files."""
@@ -126,7 +144,9 @@ class Viewport:
         """Start an export if one is due. Returns whether the viewport has to be redrawn."""
         if self._exporting is not None and not self._exporting.is_alive():
             self._exporting = None
-            state = _state_of(bpy.context.evaluated_depsgraph_get())
+            if self._path is not None and self._words != self._loaded_words:
+                self._load()  # the settings have changed after the export had been loaded
+            state = self._scene_state()
             if not self._live.needs_export and state.places.keys() == self._state.places.keys():
                 self._move(state)  # what has moved meanwhile
         due = (self._live.needs_export or self._due) and time.monotonic() - self._changed_at >= _QUIET_SECONDS
@@ -138,28 +158,35 @@ class Viewport:
         scene = bpy.data.scenes.get(self._scene)
         if scene is None:
             return
-        only = None if self._live.needs_export else sorted(self._due)
         self._exports += 1
         while self._old:
             shutil.rmtree(self._old.pop(), ignore_errors=True)
         folder = os.path.join(self._folder, str(self._exports))
         os.mkdir(folder)
         try:
+            state = self._scene_state()
+            if state.places.keys() != self._state.places.keys():
+                self._live.needs_export = True
+            elif not self._live.needs_export:
+                self._move(state)  # others than those to be exported may have moved, and may have to be exported, too
+            # Taken before the copy: the program may ask for another export at any time.
+            whole, self._live.needs_export = self._live.needs_export, False
+            only, self._due, self._state = None if whole else sorted(self._due), set(), state
             chosen = preferences.get(bpy.context)
             frame = scene.frame_current + scene.frame_subframe
             job = handoff.Job(scene, self._layer, frame, folder, chosen.exporter, only)
-            state = _state_of(bpy.context.evaluated_depsgraph_get())
-            if only is not None:
-                self._move(state)  # others than those to be exported may have moved
-            self._state = state
-            self._live.needs_export, self._due = False, set()
             warnings = job.copy()
         except Exception as error:  # a timer would be removed
             self._fail(error)
             return
-        self._live.message = "caustique: exporting"
         self._exporting = threading.Thread(target=self._export, args=(job, folder, warnings), daemon=True)
         self._exporting.start()
+
+    def _scene_state(self):
+        """The state of the viewport's scene, which is not always that of the context: windows may show several scenes."""
+        scene = bpy.data.scenes[self._scene]
+        with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[self._layer]):
+            return _state_of(bpy.context.evaluated_depsgraph_get())
 
     # --- other threads ------------------------------------------------------------------------------------------------------
 
@@ -201,12 +228,13 @@ class Viewport:
             self._load()
 
     def _load(self):
-        self._loaded_words = self._words
+        self._loaded_words = words = self._words
         # A viewport shows one moment, without motion blur.
-        self._live.load(self._path, [*self._words, "--shutter", "0"])
+        self._live.load(self._path, [*words, "--shutter", "0"])
         self._live.edit(self._moved, [path for _, path in self._parts])
 
     def _fail(self, error):
+        self._state = _NOTHING  # so that the next change exports the whole scene
         fault = fault_from_error(error)
         self._live.answered({"event": "error", "message": fault.what, "hint": fault.remedy})
 
@@ -222,12 +250,14 @@ class Viewport:
 def _concerned(depsgraph, state):
     """The names of the objects that have to be exported again after the changes of a depsgraph; None for the whole scene. A
     changed place, camera or window needs no export."""
-    names, materials, data = set(), set(), set()
+    names, materials, data, copies = set(), set(), set(), set()
     for update in depsgraph.updates:
         thing = update.id
         if isinstance(thing, bpy.types.Object):
             if update.is_updated_geometry and thing.type != "CAMERA":
                 names.add(thing.name)
+            elif update.is_updated_shading and thing.name not in state.worn:  # shown by its instances alone
+                copies.add(thing.name)
         elif isinstance(thing, bpy.types.Material):
             materials.add(thing.name)
         elif isinstance(thing, (bpy.types.Mesh, bpy.types.Light)):
@@ -240,30 +270,43 @@ def _concerned(depsgraph, state):
             return None
         elif isinstance(thing, _MATTERS) and (update.is_updated_geometry or update.is_updated_shading):
             return None
+    if materials:
+        names |= copies
     return names | {thing.name for thing in depsgraph.objects if materials.intersection(state.worn[thing.name])
                     or (thing.type in _PLACED and thing.data.name in data)}
 
 
 class _State(NamedTuple):
-    """What a viewport compares of a scene: the matrices of meshes and lights that are no instances, {name: matrix}; the names
-    of the materials of all objects, {name: names}; and the names of lights."""
+    """What a viewport compares of a scene: the matrices of objects that are no instances, {name: matrix}; the names of the
+    materials of all objects, {name: names}; to which rays they are visible, {name: switches}; the names of lights; and the names
+    of objects whose move is a change of the whole scene."""
 
     places: dict
     worn: dict
+    visible: dict
     lights: set
+    whole: set
+
+
+_NOTHING = _State({}, {}, {}, set(), set())
 
 
 def _state_of(depsgraph):
-    places, worn, lights = {}, {}, set()
+    places, worn, visible, lights, whole = {}, {}, {}, set(), set()
     for thing in depsgraph.objects:
         # Modifiers add materials to the evaluated mesh.
         used = [slot.material for slot in thing.material_slots] + list(getattr(thing.data, "materials", ()))
         worn[thing.name] = tuple(dict.fromkeys(material.name for material in used if material is not None))
-        if thing.type in _PLACED:
+        visible[thing.name] = tuple(getattr(thing, switch) for switch in _VISIBILITY)
+        # Instances move with their instancer, and meta balls merge with others.
+        is_whole = thing.is_instancer or thing.type == "META"
+        if (thing.type in _PLACED or is_whole) and not thing.hide_render:
             places[thing.name] = numpy.array(thing.matrix_world, float)
             if thing.type == "LIGHT":
                 lights.add(thing.name)
-    return _State(places, worn, lights)
+            if is_whole:
+                whole.add(thing.name)
+    return _State(places, worn, visible, lights, whole)
 
 
 def lens(camera, engine_is_orthographic):
