@@ -45,6 +45,9 @@ pub struct Description {
     pub environment_unknown: bool,
     /// Whether the file itself says that its environment is black.
     pub environment_is_black: bool,
+    /// Whether the file has a light at any time besides the environment, shown or hidden. In a file without a camera,
+    /// surfaces that glow are no lights.
+    pub has_light: bool,
     /// Index of the object that a light preset has added, which views of the whole scene do not frame.
     pub preset_floor: Option<u32>,
     /// The medium that fills the space outside all solids; `None` if it is empty.

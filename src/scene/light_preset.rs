@@ -131,14 +131,9 @@ fn add_floor(description: &mut Description) {
     }
 }
 
-/// Whether the scene has a light, or says itself that its environment is black. In a file without a camera, which is a
-/// model more than a scene, surfaces that glow are no lights.
+/// Whether the scene has a light of any kind at any time, or says itself that its environment is black.
 fn has_light(description: &Description) -> bool {
-    let emits = |material: u32| description.materials[material as usize].emits();
-    description.environment.is_some()
-        || description.environment_is_black
-        || description.lights.iter().any(|light| light.intensity.max_element() > 0.0)
-        || (!description.cameras.is_empty() && description.instances.iter().any(|placed| emits(placed.material)))
+    description.environment.is_some() || description.environment_is_black || description.has_light
 }
 
 const WIDTH: u32 = 1024;

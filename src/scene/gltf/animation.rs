@@ -9,7 +9,7 @@ use super::curve::{Curve, Sampler};
 use super::document::{Document, get, named};
 use super::extras::{self, SceneExtras};
 use super::pointer::{self, PointerError};
-use super::{FrameTime, fault};
+use super::{FrameTime, ReadOptions, fault, instant};
 use crate::error::{Error, Result};
 use serde::Deserialize;
 use serde_json::Value;
@@ -52,6 +52,8 @@ pub(super) struct Tracks {
     /// The frame to read; `None`: the time of the first key. If the scene states the time of its only frame, that time
     /// is read.
     frame: Option<FrameTime>,
+    /// Time after the frame (frames) that is read as the frame: that of a shutter which opens and closes at once.
+    instant: f64,
 }
 
 impl Tracks {
@@ -59,12 +61,14 @@ impl Tracks {
     ///
     /// # Errors
     /// A frame is given, and an animation is invalid.
-    pub(super) fn read(document: &Document, frame: Option<FrameTime>, warnings: &mut Vec<String>) -> Result<Tracks> {
+    pub(super) fn read(document: &Document, options: &ReadOptions, warnings: &mut Vec<String>) -> Result<Tracks> {
+        let frame = options.frame;
         let list = tracks(document, FaultPolicy { fatal: frame.is_some() }, warnings)?;
         if list.is_empty() && frame.is_some_and(|frame| !frame.of_sequence) {
             warnings.push("nothing in the scene is animated: its frames are all the same".into());
         }
-        Ok(Tracks { list, frame })
+        let own = if list.is_empty() { None } else { scene_extras(document)?.shutter };
+        Ok(Tracks { list, frame, instant: instant(options.shutter.or(own)) })
     }
 
     /// Whether nothing is animated.
@@ -80,6 +84,7 @@ impl Tracks {
         let Some(start) = self.list.iter().map(|track| track.curve.start()).min_by(f64::total_cmp) else {
             return Ok(());
         };
+        let after_frame = self.instant + after_frame;
         let time = match (scene_extras(document)?.time, self.frame) {
             (Some(time), frame) => {
                 if frame.is_some_and(|frame| !frame.of_sequence) {
@@ -121,7 +126,11 @@ impl Tracks {
                 ("nodes", Some(node)) if words.next() == Some("weights") => drop(parts.meshes_of_nodes.insert(node)),
                 ("nodes", Some(node)) => drop(parts.nodes.insert(node)),
                 ("meshes", Some(mesh)) => drop(parts.meshes.insert(mesh)),
-                ("materials", _) => parts.materials = true,
+                ("materials", index) => {
+                    parts.materials = true;
+                    let emits = ["/emissiveFactor", "/emissiveStrength"].iter().any(|key| pointer.ends_with(key));
+                    parts.emissions.extend(index.filter(|_| emits));
+                }
                 _ => {}
             }
         }
@@ -140,6 +149,8 @@ pub(super) struct MovingParts {
     meshes: HashSet<usize>,
     /// Whether any material changes.
     pub(super) materials: bool,
+    /// Indices of the materials whose surfaces change the light that they emit.
+    pub(super) emissions: HashSet<usize>,
 }
 
 impl MovingParts {

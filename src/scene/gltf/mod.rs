@@ -26,6 +26,7 @@ mod material;
 mod materials;
 mod mesh;
 mod nodes;
+mod own_light;
 mod pointer;
 mod profiles;
 mod shading_frame;
@@ -128,6 +129,12 @@ pub struct ReadOptions {
     pub motion_vectors: bool,
 }
 
+/// The time (frames after the frame) at which a shutter that opens and closes at once shows the scene; 0 for any other
+/// shutter.
+pub fn instant(shutter: Option<[f64; 2]>) -> f64 {
+    shutter.filter(|[open, close]| open == close).map_or(0.0, |[open, _]| open)
+}
+
 /// Reads the scene file at `path`. The buffers, textures and environment that it names must be in its folder, unless
 /// `options` allow other files.
 ///
@@ -199,7 +206,7 @@ impl MovingFile {
     pub fn moments(&self) -> Result<Moments<'_>> {
         let mut document = nodes::parse(&self.bytes, &self.path, &self.options, &mut Vec::new())
             .map_err(|e| e.within(self.path.display()))?;
-        let tracks = animation::Tracks::read(&document, self.options.frame, &mut Vec::new())?;
+        let tracks = animation::Tracks::read(&document, &self.options, &mut Vec::new())?;
         tracks.apply(&mut document, 0.0, &mut Vec::new())?;
         Ok(Moments { file: self, moving: tracks.moving_parts(), tracks, document: Mutex::new(document) })
     }

@@ -11,7 +11,8 @@ use super::shells;
 use super::topology::Solid;
 use super::transform::{WorldTransforms, check_reach, compose, is_finite, is_invertible, local};
 use super::{
-    Pose, ReadOptions, choice, compressed, counted, deform, fault, lights, mesh, profiles, shading_frame, topology, uri,
+    Pose, ReadOptions, choice, compressed, counted, deform, fault, lights, mesh, own_light, profiles, shading_frame,
+    topology, uri,
 };
 use crate::error::Result;
 use crate::geometry::Mesh;
@@ -73,7 +74,7 @@ fn describe_pose(
 ) -> Result<(Description, Shared)> {
     let mut warnings = Vec::new();
     let mut document = parse(bytes, path, options, &mut warnings)?;
-    let tracks = Tracks::read(&document, options.frame, &mut warnings)?;
+    let tracks = Tracks::read(&document, options, &mut warnings)?;
     *animated = !tracks.is_empty();
     tracks.apply(&mut document, 0.0, &mut warnings)?;
     let moving = tracks.moving_parts();
@@ -397,6 +398,9 @@ impl<'r> Reader<'r> {
                 stack.push((child.value(), to_world, shown, moves));
             }
         }
+        // A file without a camera is a model more than a scene, and its surfaces that glow are no lights.
+        let (nodes, surfaces) = ((0..seen.len()).filter(|index| seen[*index]), !self.out.cameras.is_empty());
+        self.out.has_light = self.moment.is_none() && own_light::has_light(document, self.moving, nodes, surfaces);
         Ok(())
     }
 

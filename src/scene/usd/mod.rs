@@ -64,7 +64,7 @@ pub fn read(path: &Path, options: &ReadOptions, after_frame: f64, stop: &Stop) -
     let glb = converter.folder.path().join("stage.glb");
     let mut arguments: Vec<OsString> = vec!["-o".into(), glb.clone().into()];
     if let Some(frame) = options.frame {
-        let time = f64::from(frame.number) + after_frame;
+        let time = f64::from(frame.number) + gltf::instant(options.shutter) + after_frame;
         arguments.extend(["--frame".into(), time.to_string().into()]);
     }
     converter.run(&arguments, options.allow_outside, stop)?;
@@ -99,7 +99,7 @@ fn check_choices(path: &Path, options: &ReadOptions) -> Result<()> {
 
 /// Rejects motion blur without a frame.
 fn check_blur(path: &Path, options: &ReadOptions) -> Result<()> {
-    if options.frame.is_some() || options.shutter.is_none_or(|[open, close]| open >= close) {
+    if options.frame.is_some() || options.shutter.is_none_or(|shutter| shutter == [0.0; 2]) {
         return Ok(());
     }
     let cause = "--shutter needs a frame: without one, a stage is read at no time, and nothing moves";

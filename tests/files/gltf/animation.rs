@@ -179,6 +179,26 @@ fn the_first_of_two_actions_is_played() {
     assert_eq!(scene.warnings, [both]);
 }
 
+/// A shutter that opens and closes at once, of the user or of the file, shows that moment without blur.
+#[test]
+fn a_shutter_of_no_length() {
+    let mut file = moves("LINEAR", &[0.0, 2.0], &[[0.0; 3], [8.0, 0.0, 0.0]]);
+    let read = |file: &Glb, shutter: Option<f64>| {
+        let frame = Some(FrameTime { number: 1, rate: Some(2.0), of_sequence: false });
+        let shutter = shutter.map(|time| [time; 2]);
+        let options = ReadOptions { frame, shutter, motion_vectors: true, ..ReadOptions::default() };
+        let (scene, moving) = MovingFile::from_bytes(file.bytes().into(), Path::new("pool.glb"), &options).unwrap();
+        assert_eq!(scene.shutter, None);
+        let before = moving.expect("it moves").moments().unwrap().describe_pose(-1.0).unwrap();
+        [scene, before].map(|of| of.instances[0].to_world.translation.x)
+    };
+    for (time, places) in [(0.0, [2.0, 0.0]), (0.75, [3.5, 1.5]), (-0.5, [1.0, 0.0])] {
+        assert_eq!(read(&file, Some(time)), places, "{time}");
+        file.json["scenes"][0]["extras"] = json!({"caustique": {"shutter": [time, time]}});
+        assert_eq!(read(&file, None), places, "{time}, of the file");
+    }
+}
+
 /// A file of one frame says its time in the animations, whatever frame is asked for.
 #[test]
 fn the_time_of_the_only_frame() {

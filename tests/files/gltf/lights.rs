@@ -6,8 +6,8 @@ use caustique::light::SpotEdge;
 use caustique::math::{DVec3, Rgb};
 use caustique::scene::Description;
 use caustique::scene::description::{EnvironmentSource, Projection, PunctualKind};
-use caustique::scene::environment_file;
 use caustique::scene::gltf::{LightUnits, ReadOptions, read_bytes};
+use caustique::scene::{environment_file, light_preset};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -268,6 +268,89 @@ fn a_world_that_is_left_out() {
     let mut file = Glb::new();
     file.json["asset"]["generator"] = "by hand".into();
     assert_eq!(environment(&file), (false, false));
+}
+
+/// Nothing is added to a file with a light of any kind at any time, shown or hidden.
+#[test]
+fn no_light_is_added_to_a_file_with_its_own() {
+    let fire = folder_with_fire();
+    let gets_studio = |file: &Glb| {
+        let mut scene = read_bytes(&file.bytes(), &fire.path().join("a.glb"), &ReadOptions::default()).unwrap();
+        light_preset::apply(&mut scene, None);
+        scene.environment.is_some()
+    };
+    let model = |camera: bool| {
+        let mut file = Glb::new();
+        let material = file.push("materials", json!({"emissiveFactor": [0, 0, 0]}));
+        let mesh = file.cube("cube", Some(material));
+        file.node(json!({"name": "cube", "mesh": mesh}));
+        if camera {
+            file.push("cameras", json!({"type": "perspective", "perspective": {"yfov": 0.5, "znear": 0.1}}));
+            file.node(json!({"name": "eye", "camera": 0, "translation": [0, 1, 5]}));
+        }
+        file
+    };
+    let hide = |file: &mut Glb, node: usize| {
+        file.json["nodes"][node]["extensions"]["KHR_node_visibility"] = json!({"visible": false});
+    };
+    let lamp = |file: &mut Glb, intensity: f64| {
+        file.json["extensions"] =
+            json!({"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": intensity}]}});
+        file.node(json!({"name": "lamp", "extensions": on(0)}))
+    };
+    let animate = |file: &mut Glb, to: &str, values: &[[f32; 3]; 2]| {
+        let (input, output) = (file.floats(&[[0.0], [1.0]]), file.floats(values));
+        let target = json!({"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": to}}});
+        file.push(
+            "animations",
+            json!({"samplers": [{"input": input, "output": output}], "channels": [{"sampler": 0, "target": target}]}),
+        );
+    };
+    for camera in [false, true] {
+        assert!(gets_studio(&model(camera)), "no light");
+        let mut file = model(camera);
+        animate(&mut file, "/materials/0/pbrMetallicRoughness/baseColorFactor", &[[0.0; 3], [1.0; 3]]);
+        assert!(gets_studio(&file), "another animation");
+
+        let mut file = model(camera);
+        lamp(&mut file, 0.0);
+        assert!(!gets_studio(&file), "a dark lamp");
+        let mut file = model(camera);
+        let node = lamp(&mut file, 100.0);
+        hide(&mut file, node);
+        assert!(!gets_studio(&file), "a hidden lamp");
+
+        let mut file = model(camera);
+        file.json["materials"][0] = json!({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}},
+            "extras": {"caustique": {"medium": {"density": {"file": "fire.vol"}, "emission": {"file": "fire.vol"}}}}});
+        assert!(!gets_studio(&file), "a fire");
+        hide(&mut file, 0);
+        assert!(!gets_studio(&file), "a hidden fire");
+
+        // In a file without a camera, surfaces that glow are no lights.
+        let mut file = model(camera);
+        file.json["materials"][0]["emissiveFactor"] = json!([1, 0, 0]);
+        assert_eq!(gets_studio(&file), !camera, "a surface");
+        hide(&mut file, 0);
+        assert_eq!(gets_studio(&file), !camera, "a hidden surface");
+        let mut file = model(camera);
+        animate(&mut file, "/materials/0/emissiveFactor", &[[0.0; 3], [1.0; 3]]);
+        assert_eq!(gets_studio(&file), !camera, "a surface that will glow");
+
+        let mut file = model(camera);
+        file.json["scenes"][0]["extras"] = json!({"caustique": {"environment": {"color": [0, 0, 0]}}});
+        assert!(!gets_studio(&file), "a black environment");
+    }
+}
+
+/// A folder with a grid of fire: a `.vol` file of 2 x 2 x 2 floats, of one channel, in the box from -1 to 1.
+fn folder_with_fire() -> tempfile::TempDir {
+    let header = [1u32, 2, 2, 2, 1].into_iter().flat_map(u32::to_le_bytes);
+    let values = [[-1.0f32; 3].as_slice(), &[1.0; 3], &[1.0; 8]].concat().into_iter().flat_map(f32::to_le_bytes);
+    let folder = tempfile::tempdir().unwrap();
+    let bytes: Vec<u8> = b"VOL\x03".iter().copied().chain(header).chain(values).collect();
+    std::fs::write(folder.path().join("fire.vol"), bytes).unwrap();
+    folder
 }
 
 /// OpenEXR and Radiance images, the first beside the scene file. Values that are negative or not finite are clamped and
