@@ -1,7 +1,7 @@
 //! Building a scene from a description: places and bakes meshes, makes lights, commits shapes to Embree.
 
 use super::description::{self, Description, EnvironmentSource, PunctualKind, PunctualLight};
-use super::nesting::ranks;
+use super::nesting::Volumes;
 use super::{Contacts, Scene, SolidStacks, Survey, dense};
 use crate::error::Result;
 use crate::geometry::{Instance, Mesh, Placement, Shapes};
@@ -31,7 +31,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     warn_of_dispersion(&description, &mut warnings);
     let first_light_sphere = description.objects.len() as u32;
     add_light_spheres(&mut description);
-    let groups = light_groups(&description, &mut warnings);
+    let groups = light_groups(&description, first_light_sphere, &mut warnings);
     let shutter = description.blur();
     let (center, radius) = bounding_sphere(&description);
     let origin = if center.length() > FAR_FROM_ORIGIN * radius { center } else { DVec3::ZERO };
@@ -59,7 +59,11 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     let lights = Lights::new(&shapes, &materials, others, sky).with_groups(groups);
     warn_of_cut_solids(&shapes, &materials, &mut warnings);
     warn_of_fires((&shapes, &materials), &mut warnings);
-    warn_of_lights((&shapes, &materials), &lights, description.lights.len(), description.medium, &mut warnings);
+    warn_of_lights((&shapes, &materials), &lights, description.medium, &mut warnings);
+    // With motion blur, lights that are dark at the frame may shine at another moment.
+    if lights.is_empty() && !(shutter.is_some() && description.has_light) {
+        warnings.push(black_warning(description.lights.len()));
+    }
     if description.cameras.is_empty() {
         warnings
             .push("the scene has no camera: a three-quarter view of the whole scene is used (--orbit turns it)".into());
@@ -68,7 +72,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     let contacts = Arc::new(Contacts::new(&shapes, &materials));
     warn_of_thin_walls(&shapes, &contacts, &mut warnings);
     let survey = Survey::new(&shapes, &materials, &lights, description.medium);
-    let ranks = ranks(&shapes, &materials).into();
+    let ranks = Volumes::of(&shapes, &materials).ranks(&shapes);
     Ok(Scene {
         source: description.source,
         converted: description.converted,
@@ -122,8 +126,8 @@ fn warn_of_thin_walls(shapes: &Shapes, contacts: &Contacts, warnings: &mut Vec<S
 }
 
 /// The light groups of the scene (named sets of lights, each with a layer), in order of appearance, and the group of
-/// each light.
-fn light_groups(description: &Description, warnings: &mut Vec<String>) -> Groups {
+/// each light. Objects from `first_light_sphere` on are spheres made for point lights.
+fn light_groups(description: &Description, first_light_sphere: u32, warnings: &mut Vec<String>) -> Groups {
     let mut groups = Groups::default();
     let mut of = |name: &Option<String>| {
         let Some(name) = name.as_deref().filter(|name| !name.is_empty()) else { return Group::NONE };
@@ -137,7 +141,8 @@ fn light_groups(description: &Description, warnings: &mut Vec<String>) -> Groups
     };
     let glows = |placed: &&description::PlacedMesh| {
         let material = &description.materials[placed.material as usize];
-        material.emits() || material.medium_emission().is_some()
+        // The sphere of a light that is dark at the frame shines at another moment.
+        placed.object >= first_light_sphere || material.emits() || material.medium_emission().is_some()
     };
     let instances: Vec<Group> = description
         .instances
@@ -199,12 +204,22 @@ fn warn_of_fires((shapes, materials): (&Shapes, &Materials), warnings: &mut Vec<
     }
 }
 
-/// Adds warnings about lights without effect; `punctual` is the number of point, spot and directional lights in the
-/// file.
+/// The warning that a picture will be black; `punctual` is the number of point, spot and directional lights in the file.
+fn black_warning(punctual: usize) -> String {
+    let dark = match punctual {
+        0 => "the scene has no light",
+        _ => "the intensities of all lights are zero",
+    };
+    format!(
+        "{dark}: the picture will be black (add --light-preset studio, --env, a lamp or an emissive material; Blender's own exporter leaves out \
+         area lights and the world)"
+    )
+}
+
+/// Adds warnings about lights without effect.
 fn warn_of_lights(
     (shapes, materials): (&Shapes, &Materials),
     lights: &Lights,
-    punctual: usize,
     medium: Option<MediumParameters>,
     warnings: &mut Vec<String>,
 ) {
@@ -213,16 +228,6 @@ fn warn_of_lights(
             warnings
                 .push(format!("object \"{}\": its emissive surface has no area, so it gives no light", instance.name));
         }
-    }
-    if lights.is_empty() {
-        let dark = match punctual {
-            0 => "the scene has no light",
-            _ => "the intensities of all lights are zero",
-        };
-        warnings.push(format!(
-            "{dark}: the picture will be black (add --light-preset studio, --env, a lamp or an emissive material; Blender's own exporter leaves out \
-             area lights and the world)"
-        ));
     }
     let opaque = medium.is_some_and(|medium| medium.transmittance(f32::INFINITY) == Rgb::ZERO);
     if opaque && lights.emitters().iter().any(Emitter::is_infinite) {
@@ -543,10 +548,13 @@ pub(super) fn punctual(light: &PunctualLight, origin: DVec3, distributions: &mut
     }
 }
 
-/// Turns point lights with a radius into emissive spheres, which are visible and cast soft shadows.
+/// Turns point lights with a radius into emissive spheres, which are visible and cast soft shadows. A dark light has no
+/// sphere, or, with motion blur, one that rays pass through, because it may shine at another moment.
 pub(super) fn add_light_spheres(description: &mut Description) {
+    let blurred = description.blur().is_some();
     for light in &description.lights {
-        if !light.is_sphere() || light.intensity.max_element() <= 0.0 {
+        let dark = light.intensity.max_element() <= 0.0;
+        if !light.is_sphere() || (dark && !blurred) {
             continue;
         }
         let mesh = icosphere(light.radius, 3);
@@ -567,7 +575,7 @@ pub(super) fn add_light_spheres(description: &mut Description) {
             metallic: 0.0,
             specular: 0.0,
             emission,
-            null_bsdf: light.pass_through,
+            null_bsdf: light.pass_through || dark,
             ..Material::default()
         };
         description.instances.push(description::PlacedMesh {
@@ -578,7 +586,7 @@ pub(super) fn add_light_spheres(description: &mut Description) {
             hidden_from_camera: light.hidden_from_camera,
             shadow_catcher: false,
             light_group: light.light_group.clone(),
-            moves: description.blur().is_some(),
+            moves: blurred,
             to_world: DAffine3::from_translation(light.to_world.translation),
         });
         description.objects.push(light.name.clone());

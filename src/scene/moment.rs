@@ -3,6 +3,7 @@
 
 use super::dense::limit_densities;
 use super::description::{Description, PlacedMesh, missing_at_moments};
+use super::nesting::Volumes;
 use super::{Contacts, Scene, SolidStacks, Survey, build};
 use crate::error::Result;
 use crate::geometry::{Instance, Mesh, Shapes};
@@ -22,6 +23,8 @@ pub struct MomentBuilder<'a> {
     mesh_boxes: Vec<Box3>,
     /// Bounding box of each instance at the frame, in world space.
     boxes: Vec<Box3>,
+    /// Volumes of the solids at the frame.
+    volumes: Volumes,
     /// Number of meshes from the scene file. Those of spheres made for point lights follow.
     meshes: usize,
     /// Number of materials from the scene file. Those of spheres made for point lights follow.
@@ -39,6 +42,7 @@ impl<'a> MomentBuilder<'a> {
             scene,
             mesh_boxes,
             boxes,
+            volumes: Volumes::of(&scene.shapes, &scene.materials),
             meshes: sphere.map_or(meshes.len(), |sphere| sphere.mesh as usize),
             materials: sphere.map_or(scene.materials.list.len(), |sphere| sphere.material as usize),
         }
@@ -99,8 +103,7 @@ impl<'a> MomentBuilder<'a> {
             scattering: self.scattering(&materials),
             survey: Survey::new(&shapes, &materials, &lights, medium),
             contacts: self.contacts(&shapes, &materials, &boxes),
-            // The order of solids that overlap stays that of the frame.
-            ranks: Arc::clone(&scene.ranks),
+            ranks: self.ranks(&shapes, &materials),
             solid_stacks: SolidStacks::default(),
             warnings: Vec::new(),
             shapes,
@@ -238,6 +241,11 @@ impl<'a> MomentBuilder<'a> {
         let at = |tracer: &Tracer, passed| tracer.at_moment(&scene.shapes, shapes, &filtered(passed), &filter);
         let pass_through = scene.pass_through_lights.as_ref().map(|tracer| at(tracer, true)).transpose()?;
         Ok((at(&scene.tracer, false)?, pass_through))
+    }
+
+    /// The ranks of solids that overlap, which change if one of them is scaled or deformed.
+    fn ranks(&self, shapes: &Shapes, materials: &Materials) -> Arc<[u32]> {
+        self.volumes.at_moment(&self.scene.shapes, shapes, materials).ranks(shapes)
     }
 
     fn contacts(&self, shapes: &Shapes, materials: &Materials, boxes: &[Box3]) -> Arc<Contacts> {

@@ -7,7 +7,7 @@
 use crate::geometry::{Mesh, Shapes};
 use crate::material::Materials;
 use std::collections::{BTreeMap, HashMap};
-use std::sync::{PoisonError, RwLock};
+use std::sync::{Arc, PoisonError, RwLock};
 
 /// Index of the empty stack of solids.
 pub const EMPTY_STACK: u32 = u32::MAX;
@@ -28,21 +28,64 @@ pub struct SolidStack {
     pub host: u32,
 }
 
-/// Rank of the solid that each instance belongs to. Where two solids of equal priority overlap, the one of higher rank
-/// fills the space, in any order of entry. Smaller solids have higher ranks, because a small solid may be inside a
-/// large one. All instances of an object are one solid.
-pub fn ranks(shapes: &Shapes, materials: &Materials) -> Vec<u32> {
-    let mut of_mesh = HashMap::new();
-    let mut volumes = BTreeMap::<u32, f64>::new();
-    for instance in shapes.instances.iter().filter(|i| materials.list[i.material as usize].is_solid()) {
-        let own = of_mesh.entry(instance.mesh).or_insert_with(|| volume(&shapes.meshes[instance.mesh as usize]));
-        let scale = instance.to_world.as_ref().map_or(1.0, |placement| placement.points.matrix3.determinant());
-        *volumes.entry(instance.object).or_default() += *own * f64::from(scale.abs());
+/// Relative change of a solid's volume between moments that is taken for rounding, so that solids of equal size keep
+/// their order while they turn.
+const MAX_ROUNDING: f64 = 1e-5;
+
+/// Volumes of the solids of a scene (m3).
+#[derive(Default)]
+pub struct Volumes {
+    /// By mesh, in its local space.
+    of_mesh: HashMap<u32, f64>,
+    /// By object, in world space. All instances of an object are one solid.
+    of_object: BTreeMap<u32, f64>,
+}
+
+impl Volumes {
+    /// Measures the solids of a scene.
+    pub fn of(shapes: &Shapes, materials: &Materials) -> Volumes {
+        Volumes::default().measured((shapes, materials), |_| false)
     }
-    let mut order: Vec<(f64, u32)> = volumes.into_iter().map(|(object, volume)| (volume.abs(), object)).collect();
-    order.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let rank: HashMap<u32, u32> = (0..).zip(order).map(|(rank, (_, object))| (object, rank)).collect();
-    shapes.instances.iter().map(|instance| rank.get(&instance.object).copied().unwrap_or(0)).collect()
+
+    /// Measures the solids at a moment. `self` are their volumes at the frame, whose shapes are `own`.
+    pub fn at_moment(&self, own: &Shapes, shapes: &Shapes, materials: &Materials) -> Volumes {
+        let is_same = |mesh: usize| own.meshes.get(mesh).is_some_and(|own| Arc::ptr_eq(own, &shapes.meshes[mesh]));
+        let mut now = self.measured((shapes, materials), is_same);
+        for (object, volume) in &mut now.of_object {
+            let before = self.of_object.get(object).copied().unwrap_or(0.0);
+            if (*volume - before).abs() <= MAX_ROUNDING * before.abs() {
+                *volume = before;
+            }
+        }
+        now
+    }
+
+    /// Measures the solids. Meshes for which `is_known` is true have the volumes that they have in `self`.
+    fn measured(&self, (shapes, materials): (&Shapes, &Materials), is_known: impl Fn(usize) -> bool) -> Volumes {
+        let mut volumes = Volumes::default();
+        for instance in shapes.instances.iter().filter(|i| materials.list[i.material as usize].is_solid()) {
+            let mesh = instance.mesh as usize;
+            let known = self.of_mesh.get(&instance.mesh).copied().filter(|_| is_known(mesh));
+            let own = *volumes
+                .of_mesh
+                .entry(instance.mesh)
+                .or_insert_with(|| known.unwrap_or_else(|| volume(&shapes.meshes[mesh])));
+            let scale = instance.to_world.as_ref().map_or(1.0, |placement| placement.points.matrix3.determinant());
+            *volumes.of_object.entry(instance.object).or_default() += own * f64::from(scale.abs());
+        }
+        volumes
+    }
+
+    /// Rank of the solid that each instance belongs to. Where two solids of equal priority overlap, the one of higher
+    /// rank fills the space, in any order of entry. Smaller solids have higher ranks, because a small solid may be
+    /// inside a large one.
+    pub fn ranks(&self, shapes: &Shapes) -> Arc<[u32]> {
+        let mut order: Vec<(f64, u32)> =
+            self.of_object.iter().map(|(object, volume)| (volume.abs(), *object)).collect();
+        order.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let rank: HashMap<u32, u32> = (0..).zip(order).map(|(rank, (_, object))| (object, rank)).collect();
+        shapes.instances.iter().map(|instance| rank.get(&instance.object).copied().unwrap_or(0)).collect()
+    }
 }
 
 /// Volume of a closed mesh in its local space (m3).

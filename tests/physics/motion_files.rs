@@ -150,6 +150,39 @@ fn a_scaled_object_is_blurred() {
     is_mean_of_stills("scale", &file, Method::Path, 256, 0.005);
 }
 
+/// Two absorbing cubes of equal priority that overlap, one of which grows beyond the other while the shutter is open: the
+/// smaller one fills the space at each moment.
+#[test]
+fn the_smaller_of_two_solids_fills_the_space_at_each_moment() {
+    let mut file = stage();
+    for (name, sigma, translation) in [("grows", 4.0, [0.0, 0.6, 0.0]), ("stays", 0.2, [0.1, 0.7, 0.05])] {
+        let mut matter = glass();
+        matter["name"] = json!(name);
+        matter["extensions"]["KHR_materials_ior"]["ior"] = json!(1.0);
+        matter["extras"] = json!({"caustique": {"medium": {"sigma_a": [sigma, sigma, sigma]}}});
+        let matter = file.push("materials", matter);
+        let cube = file.cube(name, Some(matter));
+        file.node(json!({"name": name, "mesh": cube, "translation": translation, "scale": [0.5, 0.5, 0.5]}));
+    }
+    animate(&mut file, json!({"node": 3, "path": "scale"}), [[0.35; 3], [0.65; 3]]);
+    is_mean_of_stills("overlap", &file, Method::Path, 256, 0.005);
+}
+
+/// A lamp of finite size that is dark until the frame, in a scene without another light.
+#[test]
+fn a_light_that_is_dark_at_the_frame_is_blurred() {
+    let mut file = stage();
+    file.json["materials"][1]["emissiveFactor"] = json!([0.0, 0.0, 0.0]);
+    file.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 0.0,
+        "extras": {"caustique": {"radius": 0.15}}}]}});
+    let lamp =
+        json!({"name": "ball", "translation": [0.3, 0.6, 0.0], "extensions": {"KHR_lights_punctual": {"light": 0}}});
+    file.node(lamp);
+    animate(&mut file, pointer("/extensions/KHR_lights_punctual/lights/0/intensity"), [[-9000.0], [9000.0]]);
+    is_mean_of_stills("dark light", &file, Method::Path, 256, 0.005);
+    is_mean_of_stills("dark light", &file, Method::Vcm, 256, 0.03);
+}
+
 #[test]
 fn a_moving_camera_is_blurred() {
     let mut file = stage();
