@@ -168,10 +168,14 @@ class Program(usd_support.Stages):
         blurred, said = mean("--frames", 1)
         self.assertAlmostEqual((1 - blurred) / (1 - still), 0.5, delta=0.2)
         self.assertIn("motion blur is the mean of 8 moments", said)
+        # A shutter of no length shows its moment, where the floor is gone.
+        moment, _ = mean("--frames", 1, "--shutter", "0.5,0.5")
+        self.assertAlmostEqual(moment, 1, delta=1e-4)
         _, said = mean()
         self.assertIn("/Camera: its shutter is ignored, because no frame is given (--frames gives one)", said)
-        refused = self.run_on("render", "-o", self.out, *QUICK, "--shutter", "-0.25,0.25", check=2)
-        self.assertIn("--shutter needs a frame", refused.stderr)
+        for shutter in ("-0.25,0.25", "0.25,0.25"):
+            refused = self.run_on("render", "-o", self.out, *QUICK, "--shutter", shutter, check=2)
+            self.assertIn("--shutter needs a frame", refused.stderr)
         settings = UsdRender.Settings.Define(self.stage, "/Settings")
         settings.CreateDisableMotionBlurAttr(True)
         self.save()
