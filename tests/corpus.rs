@@ -35,7 +35,11 @@ fn memory(key: &str) -> u64 {
 
 /// Reads a file and returns the limit that was exceeded, if any.
 fn fault(reader: Reader, path: &Path, bounds: Bounds) -> Option<String> {
-    let bytes = fs::read(path).expect("it can be read");
+    fault_of(reader, fs::read(path).expect("it can be read"), path, bounds)
+}
+
+/// Reads the bytes of a file and returns the limit that was exceeded, if any.
+fn fault_of(reader: Reader, bytes: Vec<u8>, path: &Path, bounds: Bounds) -> Option<String> {
     let folder = tempfile::tempdir().expect("a folder");
     // Resets the peak to the memory in use.
     fs::write("/proc/self/clear_refs", "5").expect("Linux lets a process");
@@ -73,6 +77,52 @@ fn kept_inputs_of_fuzzing_are_read_or_refused() {
         let files = kept(reader.0);
         assert!(files.len() > 2, "{}: nothing was kept", reader.0);
         faults.extend(files.iter().filter_map(|path| fault(reader, path, BOUNDS)));
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+/// Readers whose decoders are libraries, of which some believe the sizes in a file.
+const DECODERS: [&str; 9] = ["png", "jpeg", "webp", "ktx2", "draco", "meshopt", "exr", "exr_environment", "hdr"];
+/// Random changes of each kept input.
+const CHANGES: u64 = 24;
+
+/// A damaged copy of `bytes`: some bytes are replaced, or a part is cut off, or a large number of variable length is
+/// inserted.
+fn changed(bytes: &[u8], seed: u64) -> Vec<u8> {
+    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    // xorshift64*
+    let mut draw = move |below: usize| {
+        state ^= state >> 12;
+        state ^= state << 25;
+        state ^= state >> 27;
+        (state.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 33) as usize % below.max(1)
+    };
+    let mut bytes = bytes.to_vec();
+    for _ in 0..=draw(3) {
+        let at = draw(bytes.len());
+        match draw(8) {
+            0 => bytes.truncate(at),
+            1 => drop(bytes.splice(at..(at + 1).min(bytes.len()), [0xff, 0xff, 0xff, 0xff, 0x0f])),
+            2 => bytes[at..].iter_mut().take(4).for_each(|byte| *byte = 0xff),
+            _ => bytes[at..].iter_mut().take(1).for_each(|byte| *byte = draw(256) as u8),
+        }
+    }
+    bytes
+}
+
+/// Damaged inputs of decoders, most of which no fuzzing has kept.
+#[test]
+fn changed_inputs_of_decoders_are_read_or_refused() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut faults = Vec::new();
+    for reader in READERS.into_iter().filter(|(name, _)| DECODERS.contains(name)) {
+        for path in kept(reader.0) {
+            let bytes = fs::read(&path).expect("it can be read");
+            faults.extend((0..CHANGES).filter_map(|seed| {
+                let said = fault_of(reader, changed(&bytes, seed), &path, BOUNDS)?;
+                Some(format!("{said} (change {seed})"))
+            }));
+        }
     }
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }

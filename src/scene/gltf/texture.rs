@@ -1,7 +1,7 @@
 //! Reads textures. Each image is decoded once, and keeps the bit depth of its file.
 
 use super::document::{Document, get, named};
-use super::fault;
+use super::{fault, isolated};
 use crate::error::{Error, ErrorKind, Result};
 use crate::texture::{Encoding, Integers, Texels, Texture, TextureRef, Wrap};
 use gltf::json::texture::{MagFilter, MinFilter, Sampler, WrappingMode};
@@ -220,20 +220,23 @@ fn decode_basis(document: &Document, bytes: &[u8]) -> Result<Decoded> {
         .count_bytes(texels.saturating_mul(5), format_args!("{width} x {height} texels"))
         .map_err(|e| e.hint("save the image smaller, or render with more memory"))?;
     let decode = || {
-        let image = basisu::Transcoder::new(bytes)?;
-        let size = image.base_dimensions();
-        Ok((size, image.transcode(0, basisu::TargetFormat::Rgba32, basisu::DecodeFlags::NONE)?))
+        let transcode = || {
+            let image = basisu::Transcoder::new(bytes)?;
+            let texels = image.transcode(0, basisu::TargetFormat::Rgba32, basisu::DecodeFlags::NONE)?;
+            Ok((image.base_dimensions(), texels))
+        };
+        let (size, texels) = transcode().map_err(|e: basisu::Error| format!("{e:?}"))?;
+        if size == (width, height) { Ok(texels) } else { Err(OTHER_SIZE.into()) }
     };
-    // A panic of the decoder must not end the program.
-    let decoded: std::thread::Result<std::result::Result<_, basisu::Error>> =
-        std::panic::catch_unwind(std::panic::AssertUnwindSafe(decode));
-    let decoded = decoded.map_err(|_| broken("the decoder failed".into()))?;
-    let (size, texels) = decoded.map_err(|e| broken(format!("{e:?}")))?;
-    if size != (width, height) || texels.len() as u64 != 4 * u64::from(width) * u64::from(height) {
-        return Err(broken("its size contradicts its header".into()));
+    let texels = isolated::decode(4 * texels, decode)?.map_err(broken)?;
+    if texels.len() as u64 != 4 * u64::from(width) * u64::from(height) {
+        return Err(broken(OTHER_SIZE.into()));
     }
     Ok(Decoded { width, height, channels: 4, data: Arc::new(Integers::Bytes(texels)) })
 }
+
+/// The cause of an image of a size that its header does not say.
+const OTHER_SIZE: &str = "its size contradicts its header";
 
 /// The first bytes of a KTX2 file.
 const KTX2: &[u8] = b"\xabKTX 20\xbb\r\n\x1a\n";
@@ -256,6 +259,9 @@ fn decode(document: &Document, bytes: &[u8], place: &str, warnings: &mut Vec<Str
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     reader.limits(limits);
     let truncated = check_size(document, bytes, format)?;
+    if format == ImageFormat::WebP {
+        return decode_webp(bytes)?.map_err(|cause| broken(format!("it cannot be decoded: {cause}")));
+    }
     // A panic of a decoder must not end the program.
     let decoded = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| reader.decode()));
     let decoded = decoded.map_err(|_| broken("it cannot be decoded: the decoder failed".into()))?;
@@ -279,6 +285,31 @@ fn decode(document: &Document, bytes: &[u8], place: &str, warnings: &mut Vec<Str
         _ => return Err(broken("its texels are neither of 8 nor of 16 bits".into())),
     };
     Ok(Decoded { width, height, channels, data: Arc::new(data) })
+}
+
+/// Decodes a WebP image. Its frames repeat the size of the image, which their decoder believes.
+fn decode_webp(bytes: &[u8]) -> Result<std::result::Result<Decoded, String>> {
+    let size = |bytes| ImageReader::with_format(Cursor::new(bytes), ImageFormat::WebP).into_decoder();
+    let (width, height) = match size(bytes) {
+        Ok(decoder) => decoder.dimensions(),
+        Err(error) => return Ok(Err(error.to_string())),
+    };
+    if width.max(height) > MAX_SIDE || width.min(height) == 0 {
+        return Ok(Err(format!("{width} x {height} texels are none or too many")));
+    }
+    let texels = u64::from(width) * u64::from(height);
+    let decode = || match image::load_from_memory_with_format(bytes, ImageFormat::WebP).map_err(|e| e.to_string())? {
+        DynamicImage::ImageRgb8(image) => Ok(image.into_raw()),
+        DynamicImage::ImageRgba8(image) => Ok(image.into_raw()),
+        _ => Err("its texels are not of 8 bits".into()),
+    };
+    let decoded = isolated::decode(4 * texels, decode)?;
+    Ok(decoded.and_then(|data| {
+        let channels = (data.len() as u64 / texels) as u8;
+        let fits = matches!(channels, 3 | 4) && data.len() as u64 == texels * u64::from(channels);
+        fits.then(|| Decoded { width, height, channels, data: Arc::new(Integers::Bytes(data)) })
+            .ok_or_else(|| OTHER_SIZE.into())
+    }))
 }
 
 /// Checks that the decoded image fits in memory, because a few bytes can expand to a gigabyte. Returns whether the file
