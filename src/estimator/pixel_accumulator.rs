@@ -552,6 +552,7 @@ mod tests {
                     depth: draw(7).x,
                 },
                 first: (!i.is_multiple_of(3)).then(|| FirstHit { p: draw(8), instance: (i % 10) as u32 }),
+                features_settled: true,
                 rejection: (i % 13 == 1).then_some(Cause::Splat),
             }
         })

@@ -45,6 +45,8 @@ pub struct LayerSet {
     pub height: usize,
     /// The layers in the order of addition or of the file; names are unique.
     pub layers: Vec<Layer>,
+    /// Number of iterations that the layers are means of; `None` if unknown.
+    pub iterations: Option<u64>,
 }
 
 /// Meaning of a layer that other programs write too, independent of the name that the writing program gives it.
@@ -107,7 +109,7 @@ impl Layer {
 impl LayerSet {
     /// A set of no layers, for a picture of this size in pixels.
     pub fn new(width: usize, height: usize) -> Self {
-        LayerSet { width, height, layers: Vec::new() }
+        LayerSet { width, height, ..LayerSet::default() }
     }
 
     /// Number of pixels.

@@ -94,7 +94,7 @@ pub fn take_plain_names(set: &mut LayerSet) -> Vec<String> {
     let fits = |layer: &Layer| {
         let empty = |plane: &Plane| Plane { component: plane.component.clone(), sample: plane.sample, values: vec![] };
         let planes = layer.planes.iter().map(empty).collect();
-        let alone = LayerSet { width: 0, height: 0, layers: vec![Layer { name: layer.name.clone(), planes }] };
+        let alone = LayerSet { layers: vec![Layer { name: layer.name.clone(), planes }], ..LayerSet::default() };
         check_names(&alone, Naming::Plain).is_ok()
     };
     let (kept, left): (Vec<Layer>, Vec<Layer>) = std::mem::take(&mut set.layers).into_iter().partition(fits);

@@ -267,7 +267,8 @@ pub fn layers(
             planes = others;
         }
     });
-    let mut set = LayerSet::new(width as usize, height as usize);
+    let iterations = pixels.iter().map(|pixel| u64::from(pixel.iterations)).max();
+    let mut set = LayerSet { iterations, ..LayerSet::new(width as usize, height as usize) };
     let mut values = values.into_iter();
     for column in columns {
         let components = column.components.chars().zip(values.by_ref());
@@ -317,6 +318,7 @@ mod tests {
             } else {
                 Features::default()
             },
+            features_settled: hit,
             rejection: None,
             first: hit.then_some(FirstHit { p: Vec3::X, instance: 3 }),
         }

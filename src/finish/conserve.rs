@@ -41,19 +41,21 @@ struct Balance<'a> {
 }
 
 /// Moves the estimate `mean` of the whole picture or of a part towards `denoised` within the bound ([`displace`]), and gives
-/// back the light that this loses. `noise` belongs to the whole picture. Also counts the pixels that the bound has clamped.
+/// back the light that this loses, if there is a bound. `noise` belongs to the whole picture. Also counts the pixels that the bound has clamped.
 pub fn bounded(mean: &Picture, denoised: &Picture, noise: Noise<'_>) -> (Picture, Clamped) {
     let brightest = brightest(mean);
-    let (mut picture, clamped) = displace(mean, denoised, noise.spread, &brightest);
-    give_back(&mut picture, mean, denoised, noise, &brightest);
+    let (mut picture, clamped) = displace(mean, denoised, noise, &brightest);
+    if noise.limit.is_finite() {
+        give_back(&mut picture, mean, denoised, noise, &brightest);
+    }
     (picture, clamped)
 }
 
 /// Gives back the significant light that `picture` has lost, or takes away what it has gained, against its estimate `mean`.
-/// `brightest` are the [`brightest`] estimates of `mean`. A pixel stays within [`LIMIT`] times its spread, or within the
+/// `brightest` are the [`brightest`] estimates of `mean`. A pixel stays within the limit of `noise`, or within the
 /// light that any pixel may have missed, of its estimate.
 fn give_back(picture: &mut Picture, mean: &Picture, denoised: &Picture, noise: Noise<'_>, brightest: &Picture) {
-    let Noise { estimate, spread } = noise;
+    let Noise { estimate, spread, limit } = noise;
     let balance = Balance::new(picture, mean, denoised, estimate);
     let shortfall = balance.sum(|i, c| balance.shortfall(i, c));
     let light = balance.sum(|i, c| f64::from(picture[i][c]));
@@ -70,7 +72,7 @@ fn give_back(picture: &mut Picture, mean: &Picture, denoised: &Picture, noise: N
             let value = f64::from(picture[i][c]);
             let by_light = ratio(owed[c] - first[c], light[c]) * value;
             let (own, missed) = (f64::from(mean[i][c]), balance.missed[c]);
-            let most = (f64::from(LIMIT) * f64::from(spread[i][c])).max(missed);
+            let most = (f64::from(limit) * f64::from(spread[i][c])).max(missed);
             let value = (value + by_shortfall + by_light).clamp(own - most, own + most);
             value.min(f64::from(brightest[c]).max(missed)).max(0.0) as f32
         })
@@ -145,7 +147,7 @@ mod tests {
             [[unit * (0.1 + hits * of_one); 3], [unit * (0.01 + hits.sqrt() * of_one); 3]]
         };
         let [mean, deviation] = [0, 1].map(|which| Picture::from_fn(SIZE, |index| pixel(index)[which]));
-        Estimate { mean, deviation, albedo: None, normal: None, alpha: None }
+        Estimate { mean, deviation, albedo: None, normal: None, clean_guides: false, alpha: None, samples: None }
     }
 
     fn mean(picture: &Picture) -> f32 {
@@ -155,8 +157,9 @@ mod tests {
     /// The picture after the bounded displacement towards `constant`, and after its light has been given back.
     fn finished(estimate: &Estimate, constant: f32) -> [Picture; 2] {
         let (denoised, spread) = (Picture::filled(SIZE, [constant; 3]), spread(estimate));
-        let (within, _) = displace(&estimate.mean, &denoised, &spread, &brightest(&estimate.mean));
-        let (whole, _) = bounded(&estimate.mean, &denoised, Noise { estimate, spread: &spread });
+        let (within, _) =
+            displace(&estimate.mean, &denoised, Noise::new(estimate, &spread), &brightest(&estimate.mean));
+        let (whole, _) = bounded(&estimate.mean, &denoised, Noise::new(&estimate, &spread));
         [within, whole]
     }
 

@@ -5,7 +5,7 @@ use crate::estimator::QUARTERS;
 use crate::film::{Layer, LayerSet, Picture, Role};
 
 /// Largest ratio of standard error to estimate that rounding of single-precision sums alone can produce.
-const ROUNDING: f32 = 8.0 * f32::EPSILON;
+pub(super) const ROUNDING: f32 = 8.0 * f32::EPSILON;
 
 /// Names of two layers with independent halves of the samples.
 const HALVES: [[&str; 2]; 2] = [["Half1", "Half2"], ["HalfA", "HalfB"]];
@@ -21,8 +21,12 @@ pub struct Estimate {
     pub albedo: Option<Picture>,
     /// World-space normal at the first rough hit; `None` if unknown.
     pub normal: Option<Picture>,
+    /// Whether albedo and normal have no noise, which the denoiser would keep.
+    pub clean_guides: bool,
     /// Coverage of each pixel, 0 to 1; `None` if the picture has no alpha.
     pub alpha: Option<Vec<f32>>,
+    /// Number of independent samples that `deviation` is estimated from; `None` if unknown, and taken for many.
+    pub samples: Option<u64>,
 }
 
 impl Estimate {
@@ -51,7 +55,7 @@ impl Estimate {
         };
         let guide = |role| set.find(role).filter(|layer| layer.planes.len() >= 3).map(|layer| set.picture_of(layer));
         let (albedo, normal, alpha) = (guide(Role::Albedo), guide(Role::Normal), alpha(set));
-        Ok(Estimate { mean, deviation, albedo, normal, alpha })
+        Ok(Estimate { mean, deviation, albedo, normal, clean_guides: false, alpha, samples: set.iterations })
     }
 
     /// Whether all samples of pixel `index` have been equal: a light seen without noise, or nothing at all. A black
@@ -69,7 +73,8 @@ impl Estimate {
         let mean = quarters[0].average(&quarters[1]);
         let deviation = self.deviation.map(|error| error * std::f32::consts::SQRT_2);
         let (albedo, normal, alpha) = (self.albedo.clone(), self.normal.clone(), self.alpha.clone());
-        Estimate { mean, deviation, albedo, normal, alpha }
+        let samples = self.samples.map(|samples| samples / 2);
+        Estimate { mean, deviation, albedo, normal, alpha, samples, ..*self }
     }
 }
 

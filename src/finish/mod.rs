@@ -17,6 +17,7 @@ mod conserve;
 pub mod denoiser;
 mod estimate;
 mod finished_error;
+mod hue;
 pub mod parts;
 pub mod statistical;
 pub mod temporal;
@@ -29,7 +30,7 @@ pub use finished_error::{DEFAULT_CONVERGENCE_RATE, ErrorMap, FinishedError};
 pub use window::{Windows, window};
 
 use crate::combine::{Combiner, LevelStack};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::estimator::QUARTERS;
 use crate::film::kind::Use;
 use crate::film::{
@@ -69,6 +70,10 @@ pub fn reads(name: &str) -> bool {
 /// layers.
 pub struct Finish {
     denoiser: Denoiser,
+    /// Whether the finished picture is the denoised one, without a bound on the displacement.
+    unbounded: bool,
+    /// Whether pictures are previews, which should be ready soon: not bounded, and guides keep their noise.
+    pub preview: bool,
     /// Quality of Open Image Denoise.
     pub quality: Quality,
     /// Ends a run of Open Image Denoise early, which is an error then; `None`: each run goes to its end.
@@ -225,14 +230,28 @@ fn part_layers(set: &LayerSet) -> impl Iterator<Item = &Layer> {
 }
 
 impl Finish {
-    /// A finish by a denoiser, and by the network that combines bandwidth levels with equation (6), if there is one.
-    pub fn new(denoiser: Denoiser, network: Option<Combiner>) -> Finish {
-        Finish { denoiser, quality: Quality::High, stop: None, network }
+    /// A finish by the chosen denoiser ([`Denoiser::open`]), and by the network that combines bandwidth levels with
+    /// equation (6), if there is one.
+    ///
+    /// # Errors
+    /// As for [`Denoiser::open`].
+    pub fn open(choice: DenoiserChoice, network: Option<Combiner>) -> Result<(Finish, Option<Error>)> {
+        let (denoiser, missing) = Denoiser::open(choice)?;
+        let unbounded = choice == DenoiserChoice::Full;
+        Ok((Finish { denoiser, unbounded, preview: false, quality: Quality::High, stop: None, network }, missing))
     }
 
-    /// Name of the denoiser, with the version of Open Image Denoise.
+    /// Name of the denoiser, with the version of Open Image Denoise, and whether its pictures are not bounded.
     pub fn denoiser(&self) -> String {
-        self.denoiser.name()
+        self.denoiser.name() + if self.unbounded { ", unbounded" } else { "" }
+    }
+
+    /// Cleans the guides of a grey picture, so that the caller can time it. The first call also loads the denoiser.
+    ///
+    /// # Errors
+    /// The denoiser fails.
+    pub fn warm_up_guides(&mut self, size: Size) -> Result<()> {
+        self.denoiser.clean_guides(&mut grey(size), self.stop.as_ref())
     }
 
     /// Finishes a grey picture at a quality of the denoiser, so that the caller can time it. The first call also loads
@@ -241,11 +260,8 @@ impl Finish {
     /// # Errors
     /// The denoiser fails.
     pub fn warm_up(&mut self, size: Size, quality: Quality) -> Result<()> {
-        let plane = || Picture::filled(size, [0.5; 3]);
-        let (albedo, normal) = (Some(plane()), Some(plane()));
-        let estimate = Estimate { mean: plane(), deviation: plane(), albedo, normal, alpha: None };
         let before = std::mem::replace(&mut self.quality, quality);
-        let finished = self.picture(&estimate);
+        let finished = self.picture(&grey(size));
         self.quality = before;
         finished.map(|_| ())
     }
@@ -267,12 +283,34 @@ impl Finish {
     /// pixels.
     fn with_spread(&mut self, estimate: &Estimate) -> Result<([Picture; 2], Clamped)> {
         let denoised = self.denoiser.run(estimate, self.quality, self.stop.as_ref())?;
-        Ok(displaced(estimate, &denoised))
+        Ok(self.displaced(estimate, &denoised))
+    }
+
+    /// An estimate after its bounded displacement towards its denoised picture, the [spread](bound::spread) that limits
+    /// it, and the numbers of clamped pixels.
+    fn displaced(&self, estimate: &Estimate, denoised: &Picture) -> ([Picture; 2], Clamped) {
+        let spread = bound::spread(estimate);
+        let (picture, clamped) = conserve::bounded(&estimate.mean, denoised, self.noise(estimate, &spread));
+        ([picture, spread], clamped)
+    }
+
+    fn noise<'a>(&self, estimate: &'a Estimate, spread: &'a Picture) -> Noise<'a> {
+        let noise = Noise::new(estimate, spread);
+        if self.unbounded || self.preview { Noise { limit: f32::INFINITY, ..noise } } else { noise }
+    }
+
+    /// The estimate in a layer set; its guides have no noise, unless it is for a preview.
+    fn guided(&mut self, set: &LayerSet) -> Result<Estimate> {
+        let mut estimate = Estimate::of(set)?;
+        if !self.preview {
+            self.denoiser.clean_guides(&mut estimate, self.stop.as_ref())?;
+        }
+        Ok(estimate)
     }
 
     /// The estimate in a layer set, and the number of bandwidth levels that the network has combined to it.
     fn estimate(&mut self, set: &LayerSet) -> Result<(Estimate, Option<usize>)> {
-        let mut estimate = Estimate::of(set)?;
+        let mut estimate = self.guided(set)?;
         let Some(network) = &mut self.network else { return Ok((estimate, None)) };
         estimate.mean = network.run(&LevelStack::of(set)?)?;
         Ok((estimate, Some(network.metadata().levels)))
@@ -330,9 +368,9 @@ impl Finish {
 
     /// Averages the frame in the middle of a window with its neighbours, and the additive parts with these names; `None` if
     /// the middle is empty.
-    pub fn average(window: &temporal::Window<'_>, parts: &[String]) -> Option<Prepared> {
+    pub fn average(&self, window: &temporal::Window<'_>, parts: &[String]) -> Option<Prepared> {
         let finish_half = |estimate: &Estimate, denoised: &Picture| {
-            let ([picture, _], _) = displaced(estimate, denoised);
+            let ([picture, _], _) = self.displaced(estimate, denoised);
             picture
         };
         let average = temporal::average(window, finish_half, parts)?;
@@ -353,9 +391,9 @@ impl Finish {
         let Prepared { estimate, denoised, half, combined, parts, colors } = prepared;
         let error = half.zip(error).map(|(half, source)| error_by_quarters(&source, &estimate, &half, wanted(ERROR)));
         let (error, error_map) = error.unzip();
-        let ([picture, spread], clamped) = displaced(&estimate, &denoised);
+        let ([picture, spread], clamped) = self.displaced(&estimate, &denoised);
         drop(denoised);
-        let noise = Noise { estimate: &estimate, spread: &spread };
+        let noise = self.noise(&estimate, &spread);
         let parts = self.parts((parts, &colors), &picture, noise, wanted)?;
         let account = Finished { combined, error, error_map: error_map.flatten(), clamped };
         Ok(FinishedPicture { picture, parts, account })
@@ -367,7 +405,7 @@ impl Finish {
     /// # Errors
     /// Layers are missing, or the denoiser fails.
     pub fn estimate_error(&mut self, set: &LayerSet) -> Result<Option<FinishedError>> {
-        let estimate = Estimate::of(set)?;
+        let estimate = self.guided(set)?;
         let half = quarters(set).map(|quarters| self.picture(&estimate.first_half(&quarters))).transpose()?;
         let source = ErrorSource::of(set, own_level(set));
         Ok(half.zip(source).map(|(half, source)| error_by_quarters(&source, &estimate, &half, false).0))
@@ -439,12 +477,11 @@ impl Finish {
     }
 }
 
-/// An estimate after its bounded displacement towards its denoised picture, the [spread](bound::spread) that limits it,
-/// and the numbers of clamped pixels.
-fn displaced(estimate: &Estimate, denoised: &Picture) -> ([Picture; 2], Clamped) {
-    let spread = bound::spread(estimate);
-    let (picture, clamped) = conserve::bounded(&estimate.mean, denoised, Noise { estimate, spread: &spread });
-    ([picture, spread], clamped)
+/// A grey picture with guides.
+fn grey(size: Size) -> Estimate {
+    let plane = || Picture::filled(size, [0.5; 3]);
+    let (albedo, normal) = (Some(plane()), Some(plane()));
+    Estimate { mean: plane(), deviation: plane(), albedo, normal, clean_guides: true, alpha: None, samples: None }
 }
 
 /// The error of the picture `half`, finished from the first half of the iterations, with the errors of the pixels if they

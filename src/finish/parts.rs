@@ -77,7 +77,15 @@ mod tests {
     /// An estimate with `error` as the standard error of every pixel.
     fn estimate(mean: &Picture, error: f32) -> Estimate {
         let deviation = Picture::filled(mean.size(), [error; 3]);
-        Estimate { mean: mean.clone(), deviation, albedo: None, normal: None, alpha: None }
+        Estimate {
+            mean: mean.clone(),
+            deviation,
+            albedo: None,
+            normal: None,
+            clean_guides: false,
+            alpha: None,
+            samples: None,
+        }
     }
 
     #[test]
@@ -91,7 +99,7 @@ mod tests {
         let parts = [part(1), part(2), Part { mean: Picture::filled(size, [0.0; 3]), denoised: plane(20) }];
         let (whole, spread) = (plane(3), Picture::filled(size, [0.1; 3]));
         let estimate = estimate(&whole, 0.1);
-        let noise = Noise { estimate: &estimate, spread: &spread };
+        let noise = Noise::new(&estimate, &spread);
         let finished = split(&parts, &whole, noise, &[]);
         for index in 0..size.pixels() {
             for c in 0..3 {
@@ -110,7 +118,8 @@ mod tests {
         let plane = |value: f32| Picture::filled(size, [value; 3]);
         let part = |value: f32| Part { mean: plane(value), denoised: plane(9.0) };
         let whole = plane(0.75);
-        let exact = Noise { estimate: &estimate(&whole, 0.0), spread: &plane(0.0) };
+        let (sure, none) = (estimate(&whole, 0.0), plane(0.0));
+        let exact = Noise::new(&sure, &none);
         let finished = split(&[part(0.25), part(0.5)], &whole, exact, &[]);
         assert_eq!(finished, [plane(0.25), plane(0.5)]);
     }
@@ -136,7 +145,7 @@ mod tests {
         let parts = [emit, part(1), part(2)];
         let whole = Picture::from_fn(size, |index| [0.2 + draw(30, index); 3]);
         let (spread, estimate) = (Picture::filled(size, [0.5; 3]), estimate(&whole, 0.5));
-        let noise = Noise { estimate: &estimate, spread: &spread };
+        let noise = Noise::new(&estimate, &spread);
         let colors = [color(1), color(2)];
         let lit = |finished: &[Picture]| {
             let in_black = |index: usize| {

@@ -296,8 +296,9 @@ pub(super) fn average<T>(
     let neighbours = neighbours(window, own);
     let variance = pooled_variance(own, &neighbours);
     let guided = |mean: Picture, deviation: Picture| {
-        let Estimate { albedo, normal, alpha, .. } = &own.pictures.estimate;
-        Estimate { mean, deviation, albedo: albedo.clone(), normal: normal.clone(), alpha: alpha.clone() }
+        let Estimate { albedo, normal, clean_guides, alpha, samples, .. } = &own.pictures.estimate;
+        let (albedo, normal, alpha) = (albedo.clone(), normal.clone(), alpha.clone());
+        Estimate { mean, deviation, albedo, normal, clean_guides: *clean_guides, alpha, samples: *samples }
     };
     // The halves come first, so that their pictures do not lie in memory beside the others.
     let half = Average::new(own, &neighbours, &variance, true).map(|average| {
@@ -519,7 +520,15 @@ mod tests {
         let halves = [quarters[0].average(&quarters[1]), quarters[2].average(&quarters[3])];
         let mean = halves[0].average(&halves[1]);
         let deviation = Picture::filled(size, [sigma; 3]);
-        let estimate = Estimate { mean: mean.clone(), deviation, albedo: None, normal: None, alpha: None };
+        let estimate = Estimate {
+            mean: mean.clone(),
+            deviation,
+            albedo: None,
+            normal: None,
+            clean_guides: false,
+            alpha: None,
+            samples: None,
+        };
         let half = Some([halves[0].clone(), halves[0].clone()]);
         let pictures = Pictures { estimate, denoised: mean, half, combined: None, is_denoised: false };
         Frame::new(pictures, Vec::new(), vec![[0.0; 4]; size.pixels()], correlation(size, Some(quarters)))

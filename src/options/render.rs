@@ -15,7 +15,7 @@ use crate::estimator::InitialBandwidth;
 use crate::estimator::bandwidth::SCREEN_CAP;
 use crate::estimator::rule::chi_squared::ChiSquaredSettings;
 use crate::estimator::rule::volume::ALPHA as VOLUME_ALPHA;
-use crate::finish::{Denoiser, DenoiserChoice, Finish};
+use crate::finish::{DenoiserChoice, Finish};
 use crate::pipeline::{AutoRequest, MethodRequest, PictureRequest, with_light_paths};
 use crate::render::{
     BandwidthRule, Candidate, Counts, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, KernelChoice,
@@ -274,7 +274,7 @@ impl RenderOptions {
     /// # Errors
     /// The user chose a denoiser whose library is missing.
     pub fn forecast_finish(&self) -> Result<Finish> {
-        Ok(Finish::new(Denoiser::open(self.denoiser())?.0, None))
+        Ok(Finish::open(self.denoiser(), None)?.0)
     }
 
     /// Settings of a candidate, one of the methods that `auto` compares, for a picture of `size` pixels (width,

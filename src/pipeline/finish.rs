@@ -3,7 +3,7 @@
 use crate::combine::{Combiner, Model, Runtime};
 use crate::error::{Error, Result};
 use crate::film::{LayerSet, Size};
-use crate::finish::{Denoiser, DenoiserChoice, Finish, Finished, Quality};
+use crate::finish::{DenoiserChoice, Finish, Finished, Quality};
 use crate::render::Clock;
 use crate::stop::Stop;
 use serde_json::{Value, json};
@@ -54,10 +54,10 @@ pub fn check(request: &FinishRequest) -> Result<()> {
 /// # Errors
 /// A library that the user asks for by name is missing, or the network combines another number of levels.
 pub fn open(request: &FinishRequest, levels: Option<usize>) -> Result<OpenFinish> {
-    let (denoiser, missing) = Denoiser::open(request.denoiser)?;
     let opened = request.model.as_deref().map(|name| open_network(name, levels)).transpose()?;
     let (model, combiner) = opened.unzip();
-    Ok(OpenFinish { finish: Finish::new(denoiser, combiner), model, missing })
+    let (finish, missing) = Finish::open(request.denoiser, combiner)?;
+    Ok(OpenFinish { finish, model, missing })
 }
 
 fn open_network(name: &str, levels: Option<usize>) -> Result<(Network, Combiner)> {
@@ -98,13 +98,15 @@ impl OpenFinish {
     pub fn reserve_time(&mut self, limit: f64, pixels: usize, parts: usize) -> Result<f64> {
         let has_qualities = self.finish.has_qualities();
         let small = Size { width: TIMED_SIDE, height: TIMED_SIDE };
-        let mut time = |quality: Quality| -> Result<f64> {
+        let mut time = |run: &dyn Fn(&mut Finish) -> Result<()>| -> Result<f64> {
             // The first run also loads the library's weights.
-            self.finish.warm_up(small, quality)?;
+            run(&mut self.finish)?;
             let clock = Clock::start();
-            self.finish.warm_up(small, quality)?;
+            run(&mut self.finish)?;
             Ok(clock.seconds() * pixels as f64 / small.pixels() as f64)
         };
+        let guides = time(&|finish| finish.warm_up_guides(small))?;
+        let mut time = |quality| time(&|finish| finish.warm_up(small, quality));
         let fast = time(Quality::Fast)?;
         let mut picture = (Quality::Fast, fast);
         if has_qualities {
@@ -117,20 +119,20 @@ impl OpenFinish {
             }
         }
         self.finish.quality = picture.0;
-        // The picture, the half of its iterations that gives its error, and its parts.
-        Ok((2.0 * picture.1 + fast * parts as f64).min(MAX_FINISH_SHARE * limit))
+        // The guides, the picture, the half of its iterations that gives its error, and its parts.
+        Ok((guides + 2.0 * picture.1 + fast * parts as f64).min(MAX_FINISH_SHARE * limit))
     }
 
-    /// Finishes a preview: at the lowest quality, without its error and its parts.
+    /// Finishes a preview: at the lowest quality, without a bound, without its error and its parts.
     ///
     /// # Errors
     /// See [`Finish::apply`]. [`ErrorKind::Interrupted`](crate::error::ErrorKind::Interrupted): `stop` was requested
     /// meanwhile.
     pub fn apply_to_preview(&mut self, set: &mut LayerSet, stop: Option<&Stop>) -> Result<()> {
         let quality = std::mem::replace(&mut self.finish.quality, Quality::Fast);
-        self.finish.stop = stop.cloned();
+        (self.finish.preview, self.finish.stop) = (true, stop.cloned());
         let applied = self.finish.apply(set, |_| false);
-        (self.finish.quality, self.finish.stop) = (quality, None);
+        (self.finish.quality, self.finish.preview, self.finish.stop) = (quality, false, None);
         applied.map(|_| ())
     }
 

@@ -41,7 +41,7 @@ pub(super) fn check(selection: &Selection, shape: &Shape, finished: bool, motion
     let all = names(shape, finished).into_iter().chain(black(selection, shape, finished));
     let all = all.chain(motion.then(|| MOTION.into()));
     let layers = all.map(|name| Layer { name, planes: vec![] }).collect();
-    selection.apply(LayerSet { width: 0, height: 0, layers }).map(drop)
+    selection.apply(LayerSet { layers, ..LayerSet::default() }).map(drop)
 }
 
 /// Names of the selected layers of additive parts that a render of this shape has no light for. They are delivered
@@ -76,7 +76,7 @@ pub(super) fn check_names(selection: &Selection, shape: &Shape, finished: bool, 
         Layer { planes: components.chars().map(plane).collect(), name }
     };
     let selected = names(shape, finished).into_iter().filter(|name| selection.wants(name));
-    film::check_names(&LayerSet { width: 0, height: 0, layers: selected.map(layer).collect() }, naming)
+    film::check_names(&LayerSet { layers: selected.map(layer).collect(), ..LayerSet::default() }, naming)
 }
 
 /// Names of a scene's objects and materials, for cryptomattes.

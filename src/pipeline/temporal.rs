@@ -6,7 +6,7 @@ use super::rendered_file::RenderedFile;
 use crate::error::{Error, ErrorKind, Result};
 use crate::film::{LOBE_COLORS, Layer, LayerSet, lobe_names};
 use crate::finish::temporal::{self, REACH, WINDOW};
-use crate::finish::{ERROR, ErrorSource, Finish, Finished, parts_to_finish};
+use crate::finish::{ERROR, ErrorSource, Finished, parts_to_finish};
 use crate::image::exr::{self, Attributes};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -81,7 +81,7 @@ impl FrameFiles {
         let header = RenderedFile::read_header(&path)?.set;
         let wanted = |name: &str| !only_present || header.get(name).is_some();
         let (window, averaged) = self.averaged(number);
-        let average = Finish::average(&window, &parts_to_finish(&header, wanted));
+        let average = finish.finish().average(&window, &parts_to_finish(&header, wanted));
         let average = average.ok_or_else(|| Error::new(ErrorKind::Io, path.display(), "there is no such frame"))?;
         let of_lobes: Vec<String> = LOBE_COLORS.into_iter().chain(lobe_names()).map(String::from).collect();
         let average = average.with_colors_of(&self.layers(number, &of_lobes)?);

@@ -62,15 +62,20 @@ impl PeerDenoiser {
 
     /// Denoises a picture of another renderer; returns it with the time taken.
     fn run(&mut self, picture: &Picture) -> Result<(Picture, TimeSpent)> {
-        let estimate = Estimate {
+        let mut estimate = Estimate {
             mean: picture.clone(),
             deviation: Picture::filled(picture.size(), [0.0; 3]),
             albedo: self.albedo.clone(),
             normal: self.normal.clone(),
+            clean_guides: false,
             alpha: None,
+            samples: None,
         };
         let mut spent = TimeSpent::default();
-        let denoised = spent.measure(|| self.denoiser.run(&estimate, Quality::High, None))?;
+        let denoised = spent.measure(|| {
+            self.denoiser.clean_guides(&mut estimate, None)?;
+            self.denoiser.run(&estimate, Quality::High, None)
+        })?;
         Ok((denoised, spent))
     }
 }

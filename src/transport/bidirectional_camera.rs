@@ -76,14 +76,9 @@ pub(super) fn record_surface(
         Some(scattered) => history.scattered(scattered.lobe),
     }
     history.length += vertex.distance;
-    let shading = vertex.shading;
-    if history.is_clear() && shading.bsdf.lobes().intersects(LobeSet::SMOOTH) {
-        let n = shading.frame.n;
-        sample.features = Features {
-            albedo: shading.albedo(LobeSet::ALL),
-            normal: if n.dot(vertex.wo) < 0.0 { -n } else { n },
-            depth: history.length,
-        };
+    let lobes = vertex.shading.bsdf.lobes();
+    if lobes.intersects(LobeSet::SMOOTH) {
+        sample.store_features(lobes, || vertex.features(history.length));
     }
 }
 
@@ -100,9 +95,8 @@ pub(super) fn record_medium(
         Some(scattered) => history.scattered(scattered.lobe),
     }
     history.length += vertex.arrival.distance;
-    if history.is_clear() {
-        sample.features = Features { albedo: vertex.albedo(), normal: vertex.wo, depth: history.length };
-    }
+    let features = || Features { albedo: vertex.albedo(), normal: vertex.wo, depth: history.length };
+    sample.store_features(LobeSet::BROAD, features);
 }
 
 impl<R: PathRecorder> CameraWalk<'_, R> {

@@ -26,7 +26,7 @@ use super::glint::{Glints, Onward};
 use super::lobe_layers::{FirstScatter, LobeHistory, LobeRecord};
 use super::pass_through::{BulbHit, PassThroughHit};
 use super::photon_batch::{Scratch, Waiting};
-use super::pixel_sample::{Features, PixelSample};
+use super::pixel_sample::PixelSample;
 use super::scattering_vertex::ScatterPoint;
 use super::segment::FirstHit;
 use super::shares::leads;
@@ -272,12 +272,8 @@ impl<'a, B: GatherBandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gath
         let lobes = shading.bsdf.lobes();
         let smooth = lobes & LobeSet::SMOOTH;
         // Lights and other surfaces that scatter nothing have features, too.
-        if self.suffix.is_clear() && lobes != LobeSet::DELTA {
-            self.sample.features = Features {
-                albedo: shading.albedo(LobeSet::ALL),
-                normal: if shading.frame.n.dot(vertex.wo) < 0.0 { -shading.frame.n } else { shading.frame.n },
-                depth: self.length,
-            };
+        if lobes != LobeSet::DELTA {
+            self.sample.store_features(lobes, || vertex.features(self.length));
         }
         self.lobes = lobes;
         if smooth.is_empty() {

@@ -27,12 +27,6 @@ impl PathHistory {
         self.suffix = self.suffix.then(Event::at_vertex(lobe, self.lobes));
     }
 
-    /// Whether all vertices so far were perfect mirrors or clear glass.
-    #[inline]
-    pub fn is_clear(&self) -> bool {
-        self.suffix.is_clear()
-    }
-
     /// Sets the lobes of the vertex that the path leaves; `None` in a medium.
     #[inline]
     pub fn leave(&mut self, lobes: Option<LobeSet>) {

@@ -3,9 +3,11 @@
 use super::bandwidths::MAX_LEVELS;
 use super::cause::Cause;
 use super::segment::FirstHit;
+use crate::bsdf::LobeSet;
 use crate::math::{Rgb, Vec3};
 
-/// G-buffer of one camera path, at its first vertex that is not a perfect mirror or clear glass; zero if there is none.
+/// G-buffer of one camera path, at its first vertex that scatters broadly; at its last narrow one if there is none, and
+/// zero if all are perfect mirrors or clear glass.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Features {
     /// Directional albedo.
@@ -35,6 +37,8 @@ pub struct PixelSample {
     pub volume_photons: [Rgb; MAX_LEVELS],
     /// G-buffer of the camera path.
     pub features: Features,
+    /// Whether `features` are those of a vertex that scatters broadly, so that later vertices do not replace them.
+    pub features_settled: bool,
     /// First visible hit of the camera path; `None` if it hits nothing.
     pub first: Option<FirstHit>,
     /// Why the sample has to be rejected: the source of its first value that is not finite; `None` if all are finite.
@@ -46,6 +50,15 @@ impl PixelSample {
     #[cold]
     pub fn reject(&mut self, cause: Cause) {
         self.rejection.get_or_insert(cause);
+    }
+
+    /// Stores the G-buffer of a vertex with these lobes, unless the path has met one that scatters broadly.
+    #[inline]
+    pub fn store_features(&mut self, lobes: LobeSet, features: impl FnOnce() -> Features) {
+        if !self.features_settled {
+            self.features = features();
+            self.features_settled = lobes.intersects(LobeSet::BROAD);
+        }
     }
 
     /// Radiance estimate at a bandwidth level (from 0, the smallest), the sum of all parts.

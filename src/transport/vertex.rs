@@ -2,6 +2,7 @@
 
 use super::interior::Interior;
 use super::pass_through::{BulbHit, PassThroughHit};
+use super::pixel_sample::Features;
 use super::roulette::survival;
 use super::segment::MediumArrival;
 use crate::bsdf::{BsdfSample, LobeSet, Shading};
@@ -43,6 +44,16 @@ pub struct Vertex<'v, 'a> {
 }
 
 impl Vertex<'_, '_> {
+    /// The G-buffer of this vertex, at the end of a camera path of this length (scene units).
+    pub(super) fn features(&self, length: f32) -> Features {
+        let n = self.shading.frame.n;
+        Features {
+            albedo: self.shading.albedo(LobeSet::ALL),
+            normal: if n.dot(self.wo) < 0.0 { -n } else { n },
+            depth: length,
+        }
+    }
+
     /// Probability that roulette lets the path continue if the visitor asks for the lobes in `set`. It does not depend
     /// on the sampled direction, so MIS weights can use it.
     #[inline]

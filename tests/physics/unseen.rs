@@ -3,7 +3,7 @@
 use crate::support;
 
 use caustique::estimator::{InitialBandwidth, PixelAccumulator};
-use caustique::finish::{Denoiser, Finish};
+use caustique::finish::{DenoiserChoice, Finish};
 use caustique::math::{DVec3, Vec3};
 use caustique::render::{
     Accuracy, Levels, Method, RenderInput, Rendered, Session, Settings, Shard, ShardResult, StopReason,
@@ -57,7 +57,8 @@ fn rendered(scene: &Scene, settings: &Settings) -> (Rendered, Accuracy) {
         session.step();
     }
     let set = session.layers(|_| true).expect("all layers");
-    let error = Finish::new(Denoiser::Own, None).estimate_error(&set).expect("our own denoiser does not fail");
+    let (mut finish, _) = Finish::open(DenoiserChoice::Own, None).expect("our own denoiser needs no library");
+    let error = finish.estimate_error(&set).expect("our own denoiser does not fail");
     session.record_finished_error(error);
     let accuracy = Accuracy::fit(session.history()).expect("there is noise");
     (session.finish(StopReason::Iterations), accuracy)

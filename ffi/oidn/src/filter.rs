@@ -21,6 +21,18 @@ pub enum Quality {
     High,
 }
 
+/// What a picture shows. A guide is denoised alone, without guides of its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Content {
+    /// Colour: radiance, or a picture on a display.
+    #[default]
+    Color,
+    /// Albedo of the surfaces, from 0 to 1.
+    Albedo,
+    /// Normals of the surfaces, each coordinate from -1 to 1.
+    Normal,
+}
+
 /// A picture to denoise, its guides and settings. Pictures are row-major with three channels per pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a> {
@@ -28,9 +40,11 @@ pub struct Input<'a> {
     pub width: usize,
     /// Height in pixels.
     pub height: usize,
-    /// The noisy picture. NaN and negative values count as 0. Infinite and huge values are allowed, but spoil the
+    /// The noisy picture. NaN and negative colours count as 0. Infinite and huge colours are allowed, but spoil the
     /// result: see the crate's documentation.
     pub color: &'a [[f32; 3]],
+    /// What `color` shows. Only colour uses the guides and `hdr`.
+    pub content: Content,
     /// Albedo of the surfaces, from 0 to 1, as a guide; `None` without.
     pub albedo: Option<&'a [[f32; 3]]>,
     /// Normals of the surfaces, each coordinate from -1 to 1, as a guide; `None` without. Only together with `albedo`.
@@ -54,6 +68,7 @@ impl<'a> Input<'a> {
             width,
             height,
             color,
+            content: Content::Color,
             albedo: None,
             normal: None,
             quality,
@@ -120,7 +135,7 @@ impl Filter {
         filter.ok_or_else(|| Error::Oidn { during, message: api::error_name(1).into() })
     }
 
-    /// Denoises a picture. The values of the result are finite and not negative, for any input.
+    /// Denoises a picture. The values of the result are finite, for any input; colours and albedos are not negative.
     ///
     /// # Errors
     ///
@@ -147,7 +162,7 @@ impl Filter {
         if poll.ended.into_inner() { Ok(None) } else { denoised.map(Some) }
     }
 
-    fn execute(&mut self, input: &Input, poll: Option<&Poll>) -> Result<Vec<[f32; 3]>, Error> {
+    fn execute<'i>(&mut self, input: &Input<'i>, poll: Option<&Poll>) -> Result<Vec<[f32; 3]>, Error> {
         input.check()?;
         let mut output = Vec::new();
         output.try_reserve_exact(input.color.len()).map_err(|error| Error::Oidn {
@@ -158,9 +173,11 @@ impl Filter {
 
         // All pointers are set for every picture, because those of the last picture may be invalid.
         let size = (input.width, input.height);
-        self.set_image(c"color", Some(input.color), size)?;
-        self.set_image(c"albedo", input.albedo, size)?;
-        self.set_image(c"normal", input.normal, size)?;
+        let own = |content| (input.content == content).then_some(input.color);
+        let guide = |guide: Option<&'i [[f32; 3]]>| guide.filter(|_| input.content == Content::Color);
+        self.set_image(c"color", own(Content::Color), size)?;
+        self.set_image(c"albedo", guide(input.albedo).or(own(Content::Albedo)), size)?;
+        self.set_image(c"normal", guide(input.normal).or(own(Content::Normal)), size)?;
         self.set_pixels(c"output", output.as_mut_ptr().cast(), size)?;
         let quality = match input.quality {
             Quality::Fast if self.device.library().has_fast() => api::QUALITY_FAST,
@@ -170,8 +187,8 @@ impl Filter {
         let memory = input.max_memory_mib.map_or(-1, |mib| c_int::try_from(mib).unwrap_or(c_int::MAX));
         self.set_int(c"quality", quality)?;
         self.set_int(c"maxMemoryMB", memory)?;
-        self.set_bool(c"hdr", input.hdr)?;
-        self.set_bool(c"cleanAux", input.clean_aux && input.albedo.is_some())?;
+        self.set_bool(c"hdr", input.hdr && input.content == Content::Color)?;
+        self.set_bool(c"cleanAux", input.clean_aux && guide(input.albedo).is_some())?;
 
         let functions = self.device.functions();
         // SAFETY: the handle is a filter, and its pictures have the sizes that were set (checked above).

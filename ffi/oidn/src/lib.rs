@@ -65,6 +65,6 @@ mod load;
 pub use caustique_library::{Folders, Version};
 pub use device::Device;
 pub use error::Error;
-pub use filter::{Filter, Input, Quality};
+pub use filter::{Content, Filter, Input, Quality};
 pub use library::{LIBRARY_VARIABLE, Library};
 pub use limits::{MAX_SIDE, MAX_THREADS};

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use caustique_oidn::{Device, Error, Folders, Input, Library, MAX_SIDE, MAX_THREADS, Quality, Version};
+use caustique_oidn::{Content, Device, Error, Folders, Input, Library, MAX_SIDE, MAX_THREADS, Quality, Version};
 
 const QUALITIES: [Quality; 3] = [Quality::Fast, Quality::Balanced, Quality::High];
 
@@ -94,6 +94,27 @@ fn noise_on_a_constant_picture_is_removed() {
         check(&input, "albedo and normal");
         input.clean_aux = true;
         check(&input, "clean guides");
+    }
+}
+
+/// Guides are denoised alone; normals may be negative.
+#[test]
+fn noise_of_guides_is_removed() {
+    let (width, height) = (96, 80);
+    for (content, clean) in [(Content::Albedo, [0.6, 0.3, 0.5]), (Content::Normal, [-0.6, 0.8, 0.0])] {
+        let difference = |pixels: &[[f32; 3]]| -> f32 {
+            pixels.iter().flat_map(|p| (0..3).map(|c| (p[c] - clean[c]).powi(2))).sum::<f32>().sqrt()
+        };
+        let noisy: Vec<[f32; 3]> =
+            noise(width * height, 3).iter().map(|p| std::array::from_fn(|c| clean[c] + 0.4 * (p[c] - 1.0))).collect();
+        for quality in QUALITIES {
+            let input = Input { content, quality, ..Input::new(width, height, &noisy) };
+            let denoised = device(1).denoise(&input).unwrap();
+            assert!(difference(&denoised) < 0.2 * difference(&noisy), "{content:?}, {quality:?}");
+            // Guides of a guide do not matter.
+            let guided = Input { albedo: Some(&noisy), clean_aux: true, ..input };
+            assert_eq!(bits(&device(1).denoise(&guided).unwrap()), bits(&denoised));
+        }
     }
 }
 

@@ -302,7 +302,7 @@ pub fn picture(place: &str, given: &Bound<'_, PyAny>, name: Option<&str>) -> PyR
         let error = set.get("Error").filter(|_| name.is_empty());
         let picture = Layer { name: String::new(), ..layer.clone() };
         let layers = std::iter::once(picture).chain(error.cloned()).collect();
-        Ok(LayerSet { width: set.width, height: set.height, layers })
+        Ok(LayerSet { width: set.width, height: set.height, layers, iterations: set.iterations })
     };
     if let Ok(image) = given.cast::<Image>() {
         return chosen(&image.get().set);
@@ -311,7 +311,7 @@ pub fn picture(place: &str, given: &Bound<'_, PyAny>, name: Option<&str>) -> PyR
         return chosen(&read(given.py(), path)?.set);
     }
     let ((height, width), layer) = layer("", given)?;
-    Ok(LayerSet { width, height, layers: vec![layer] })
+    Ok(LayerSet { width, height, layers: vec![layer], iterations: None })
 }
 
 /// The array, or a Python exception for its wrong shape.

@@ -95,4 +95,9 @@ impl Attributes {
     pub fn object(&self) -> Option<serde_json::Value> {
         serde_json::from_str(self.texts.get(ATTRIBUTE)?).ok()
     }
+
+    /// Number of iterations of the render; `None` if caustique has not written the file.
+    pub fn iterations(&self) -> Option<u64> {
+        self.object()?["iterations"].as_u64()
+    }
 }

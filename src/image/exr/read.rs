@@ -54,7 +54,8 @@ pub fn read_header(path: &Path) -> Result<(LayerSet, Attributes)> {
         let first = headers.first().ok_or_else(|| invalid("no part"))?;
         let size = first.shared_attributes.display_window.size;
         let layers = layers(headers.iter().map(|header| vec![Vec::new(); header.channels.list.len()]), headers);
-        Ok((LayerSet { width: size.0, height: size.1, layers }, attributes(headers)))
+        let attributes = attributes(headers);
+        Ok((LayerSet { width: size.0, height: size.1, layers, iterations: attributes.iterations() }, attributes))
     })
 }
 
@@ -113,7 +114,9 @@ fn decode(file: BufReader<File>, length: u64, wanted: &dyn Fn(&str) -> bool) -> 
     }
     let mut set = canvas.into_layers(&meta.headers, wanted);
     convert_to_rec_709(&mut set, meta.headers[0].shared_attributes.chromaticities.as_ref());
-    Ok((set, attributes(&meta.headers)))
+    let attributes = attributes(&meta.headers);
+    set.iterations = attributes.iterations();
+    Ok((set, attributes))
 }
 
 /// Whether the layer of each channel is wanted, by part and by channel.
@@ -245,7 +248,7 @@ impl Canvas {
     fn into_layers(self, headers: &[Header], wanted: &dyn Fn(&str) -> bool) -> LayerSet {
         let mut layers = layers(self.planes, headers);
         layers.retain(|layer| wanted(&layer.name));
-        LayerSet { width: self.width, height: self.height, layers }
+        LayerSet { width: self.width, height: self.height, layers, iterations: None }
     }
 }
 

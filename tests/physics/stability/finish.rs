@@ -2,7 +2,7 @@
 
 use caustique::film::{Picture, Size};
 use caustique::finish::bound::{LIMIT, REACH, spread};
-use caustique::finish::{Denoiser, DenoiserChoice, Estimate, Finish, Windows, window};
+use caustique::finish::{DenoiserChoice, Estimate, Finish, Windows, window};
 use caustique::random::{Domain, Purpose, Stream};
 
 const NONE: f32 = f32::NAN;
@@ -13,7 +13,15 @@ fn estimate(size: Size, of: impl Fn(usize) -> f32 + Sync + Send) -> Estimate {
     let mean = Picture::from_fn(size, |i| [of(i), 0.5 * of(i), of(i) * (0.9 + 0.2 * draw(i))]);
     let deviation = mean.map(|value| 0.1 * value);
     let (albedo, normal) = (Picture::filled(size, [0.5; 3]), Picture::filled(size, [0.0, 0.0, 1.0]));
-    Estimate { mean, deviation, albedo: Some(albedo), normal: Some(normal), alpha: None }
+    Estimate {
+        mean,
+        deviation,
+        albedo: Some(albedo),
+        normal: Some(normal),
+        clean_guides: true,
+        alpha: None,
+        samples: None,
+    }
 }
 
 /// The pixels of a picture that violate a bound: each channel must be a number between zero and the brightest estimate
@@ -49,8 +57,7 @@ fn no_denoiser_leaves_the_bounds() {
         ("nothing", &|_| NONE),
     ];
     for choice in [DenoiserChoice::None, DenoiserChoice::Own, DenoiserChoice::Oidn] {
-        let (denoiser, _) = Denoiser::open(choice).expect("the denoisers are installed");
-        let mut finish = Finish::new(denoiser, None);
+        let (mut finish, _) = Finish::open(choice, None).expect("the denoisers are installed");
         for size in sizes {
             for (name, of) in &pictures {
                 let estimate = estimate(size, of);
