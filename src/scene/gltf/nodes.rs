@@ -618,6 +618,7 @@ impl<'r> Reader<'r> {
             let bounds = Solid { closed: mesh.closed, ..CLOSED };
             meshes.push(MaterialMesh { primitive, mesh, file_material, material: part.material, bounds });
         }
+        topology::weld_seams(&mut meshes.iter_mut().map(|part| &mut part.mesh).collect::<Vec<_>>());
         Ok(meshes)
     }
 
@@ -631,6 +632,7 @@ impl<'r> Reader<'r> {
                 read.push((i, mesh));
             }
         }
+        topology::weld_seams(&mut read.iter_mut().map(|(_, mesh)| mesh).collect::<Vec<_>>());
         // A solid may have several materials, so the surface as a whole decides whether it is closed.
         let whole = topology::solid(&read.iter().map(|(_, m)| m).collect::<Vec<_>>());
         let mut meshes = Vec::new();
