@@ -5,6 +5,8 @@
 
 pub mod error;
 
+pub mod git_lfs;
+
 pub mod processor;
 
 pub mod installed;

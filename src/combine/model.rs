@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::tensor;
 use crate::error::{Error, ErrorKind, Result};
+use crate::git_lfs;
 
 /// The bytes of a neural network's ONNX file, and the name of the file for messages.
 #[derive(Clone, Debug)]
@@ -28,6 +29,7 @@ impl Model {
             Error::io(path, &cause)
                 .hint("--model takes compact, or an ONNX file made by scripts/lab/train/export_network.py")
         })?;
+        git_lfs::check(&bytes, path.display())?;
         Ok(Model { name: path.display().to_string(), bytes: Cow::Owned(bytes) })
     }
 

@@ -6,6 +6,7 @@
 use super::records::{self, Record};
 use crate::error::{Error, ErrorKind, Result};
 use crate::estimator::PixelAccumulator;
+use crate::git_lfs;
 use crate::image::atomic;
 use crate::render::{Candidate, State};
 use crate::scene::gltf;
@@ -97,6 +98,7 @@ pub fn read(path: &Path) -> Result<(Head, State)> {
     let error = |cause: &str| Error::new(ErrorKind::Io, path.display(), cause);
     let missing =
         |cause| Error::io(path, &cause).hint("name a file that --checkpoint wrote, or start anew without --resume");
+    git_lfs::check_file(path)?;
     let mut file = BufReader::new(File::open(path).map_err(missing)?);
     let mut magic = [0; MAGIC.len()];
     if file.read_exact(&mut magic).is_err() || magic != *MAGIC {

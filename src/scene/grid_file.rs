@@ -11,6 +11,7 @@
 //! | rest | values: channel by channel of a cell, x fastest, then y, then z |
 
 use crate::error::{Error, ErrorKind, Result};
+use crate::git_lfs;
 use crate::math::Vec3;
 use crate::medium::Grid;
 use crate::memory;
@@ -39,6 +40,7 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Grid> {
     let mut file = File::open(path).map_err(io)?;
     let mut header = Vec::new();
     file.by_ref().take(HEADER_BYTES).read_to_end(&mut header).map_err(io)?;
+    git_lfs::check(&header, path.display())?;
     let failed = |cause: String| {
         Error::new(ErrorKind::Scene, path.display(), cause).hint("write the grid as a .vol file, version 3, of Mitsuba")
     };

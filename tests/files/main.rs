@@ -5,6 +5,7 @@ mod support;
 
 mod cryptomatte;
 mod exr;
+mod git_lfs;
 mod gltf;
 mod messages;
 mod metrics;

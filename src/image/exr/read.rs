@@ -17,6 +17,7 @@ use super::colour_space::convert_to_rec_709;
 use super::{Attributes, zip};
 use crate::error::{Error, ErrorKind, Result};
 use crate::film::{Layer, LayerSet, Plane, Sample};
+use crate::git_lfs;
 use crate::memory;
 
 /// Reads every channel of every part of an EXR as layers, and the string attributes of all parts.
@@ -66,6 +67,7 @@ fn open<T>(path: &Path, decode: impl FnOnce(BufReader<File>, u64) -> Outcome<T>)
     if length == 0 {
         return Err(Error::new(ErrorKind::Image, path.display(), "the file is empty"));
     }
+    git_lfs::check_file(path)?;
     // Assertions in the decoder fail for some malformed files.
     let outcome = catch_unwind(AssertUnwindSafe(|| decode(BufReader::new(file), length)));
     let outcome = outcome.unwrap_or_else(|_| Err(invalid("the file contradicts itself")));

@@ -3,6 +3,7 @@
 
 use super::fault;
 use crate::error::{Error, Result};
+use crate::git_lfs;
 use serde_json::Value;
 use std::collections::BTreeSet;
 
@@ -54,6 +55,7 @@ pub(super) fn is_supported(extension: &str) -> bool {
 
 /// Splits the bytes of a `.glb` into its JSON and its binary chunk; a `.gltf` is JSON alone, and the chunk is empty.
 pub(super) fn split(bytes: &[u8]) -> Result<(Value, &[u8])> {
+    git_lfs::check(bytes, "")?;
     let (json, binary) = if bytes.starts_with(b"glTF") { chunks(bytes)? } else { (bytes, &[][..]) };
     let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
     if json.iter().find(|b| !b.is_ascii_whitespace()) != Some(&b'{') {

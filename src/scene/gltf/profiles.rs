@@ -6,6 +6,7 @@ use super::extras::{self, GoboExtras, IesExtras, LightExtras, Normalize};
 use super::texture::{Textures, Use};
 use super::{fault, uri};
 use crate::error::{Error, Result};
+use crate::git_lfs;
 use crate::light::{Pattern, Picture};
 use crate::math::{DAffine3, Rgb};
 use crate::scene::description::{PunctualKind, PunctualLight};
@@ -77,7 +78,9 @@ impl Source {
                 if !meta.is_file() || meta.len() > ies::MAX_BYTES {
                     return Err(io(std::io::Error::other("it is not a regular file of less than 64 MiB")));
                 }
-                std::fs::read(&path).map(Cow::Owned).map_err(io)
+                let bytes = std::fs::read(&path).map_err(io)?;
+                git_lfs::check(&bytes, path.display())?;
+                Ok(Cow::Owned(bytes))
             }
         }
     }

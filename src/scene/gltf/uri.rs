@@ -2,6 +2,7 @@
 
 use super::fault;
 use crate::error::{Error, ErrorKind, Result};
+use crate::git_lfs;
 use crate::scene::folder::Folder;
 use std::path::PathBuf;
 
@@ -30,7 +31,9 @@ pub(super) fn load(uri: &str, folder: Folder, reserve: impl FnOnce(u64) -> Resul
         return Err(cause(std::io::Error::other("it is not a regular file")));
     }
     reserve(meta.len())?;
-    std::fs::read(&path).map_err(cause)
+    let bytes = std::fs::read(&path).map_err(cause)?;
+    git_lfs::check(&bytes, path.display())?;
+    Ok(bytes)
 }
 
 /// The path of the file that a URI names.
