@@ -131,6 +131,7 @@ impl Plan {
         warnings.extend(request.max_depth.map(|most| depth_warning(most, &effects, scene)));
         warnings.extend(diagnosis::warnings(scene, camera, request));
         let reason_if_black = diagnosis::black::reason(scene, camera, &effects, request, !warnings.is_empty());
+        warnings.extend(diagnosis::terminator::stepped_shadows(scene));
         Plan {
             reason_if_black,
             scene: scene.source.display().to_string(),

@@ -29,6 +29,12 @@ const MAX_FIRE_OUTSIDE: f32 = 1e-3;
 pub(super) fn build(mut description: Description, threads: usize) -> Result<Scene> {
     let mut warnings = std::mem::take(&mut description.warnings);
     warn_of_dispersion(&description, &mut warnings);
+    if description.instances.is_empty() {
+        warnings.push(
+            "the scene has no mesh: the picture shows lights and the environment alone (was it exported with its objects?)"
+                .into(),
+        );
+    }
     let first_light_sphere = description.objects.len() as u32;
     add_light_spheres(&mut description);
     let groups = light_groups(&description, first_light_sphere, &mut warnings);

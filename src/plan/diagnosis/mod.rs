@@ -10,6 +10,7 @@ mod glass;
 mod lights;
 mod overlap;
 mod rays;
+pub(super) mod terminator;
 
 use super::PlanRequest;
 use crate::camera::Camera;

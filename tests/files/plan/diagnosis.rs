@@ -88,6 +88,22 @@ fn back_faces_that_the_camera_looks_through() {
     silent(screen(Vec3::X, Vec3::Y, true));
 }
 
+/// A coarse smooth ball under a lamp is reported; a fine one, a flat one, and one under the sky are not.
+#[test]
+fn terminators_that_follow_the_facets() {
+    let shape = |segments| sphere(Vec3::new(0.0, 1.0, 0.0), 0.5, segments);
+    assert_eq!(
+        warning(with(lit(), "Ball", shape(12), matte(0.5, 0.0))),
+        "object \"Ball\": its faces are large for smooth shading, so the edge of the shadow on its far side follows them in \
+         steps; subdivide the mesh (there is no shadow terminator offset, as Cycles has)"
+    );
+    silent(with(lit(), "Ball", shape(64), matte(0.5, 0.0)));
+    silent(with(lit(), "Ball", Mesh { normals: Vec::new(), ..shape(12) }, matte(0.5, 0.0)));
+    let source = EnvironmentSource::Color(Rgb::ONE);
+    let environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
+    silent(Description { environment, ..with(floor(), "Ball", shape(12), matte(0.5, 0.0)) });
+}
+
 #[test]
 fn glass_too_rough_for_a_caustic() {
     let frosted = Material { roughness: 0.6, ..glass(1.5) };
