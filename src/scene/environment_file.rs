@@ -2,13 +2,15 @@
 
 use super::description::EnvironmentSource;
 use crate::error::{Error, ErrorKind, Result};
+use crate::git_lfs;
 use crate::math::Vec3;
 use crate::memory;
 use crate::spectrum::primaries::to_rec_709;
 use exr::prelude::{ReadChannels, ReadLayers};
 use image::ImageDecoder;
+use image::codecs::hdr::HdrDecoder;
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufRead, BufReader};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
@@ -33,6 +35,7 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<EnvironmentSource
     if !meta.is_file() {
         return Err(io(std::io::Error::other("it is not a regular file")));
     }
+    git_lfs::check_file(path)?;
     let mut start = Vec::new();
     std::io::Read::read_to_end(&mut std::io::Read::take(File::open(path).map_err(io)?, 10), &mut start).map_err(io)?;
     let failed = |cause: String| {
@@ -108,11 +111,36 @@ fn read_exr(path: &Path) -> std::result::Result<Pixels, String> {
 }
 
 fn read_hdr(path: &Path) -> std::result::Result<Pixels, String> {
-    let file = BufReader::new(File::open(path).map_err(|e| e.to_string())?);
-    let decoder = image::codecs::hdr::HdrDecoder::new(file).map_err(|e| e.to_string())?;
+    let mut file = BufReader::new(File::open(path).map_err(|e| e.to_string())?);
+    // Other programs than Radiance write other names, such as #?RGBE, which the strict decoder refuses.
+    let by_radiance = file.fill_buf().map_err(|e| e.to_string())?.starts_with(b"#?RADIANCE");
+    let decoder = HdrDecoder::with_strictness(file, by_radiance).map_err(|e| e.to_string())?;
     let (width, height) = decoder.dimensions();
     check_size(u64::from(width), u64::from(height))?;
     let mut texels = vec![[0.0f32; 3]; width as usize * height as usize];
     decoder.read_image(bytemuck::cast_slice_mut(&mut texels)).map_err(|e| e.to_string())?;
     Ok((width, height, texels))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Radiance files of other programs start with other names.
+    #[test]
+    fn radiance_files_of_other_programs_are_read() {
+        let temporary = tempfile::tempdir().expect("a folder");
+        let path = temporary.path().join("sky.hdr");
+        for program in ["RADIANCE", "RGBE", "any"] {
+            let head = format!("#?{program}\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n");
+            let texels = [128u8, 128, 128, 129, 64, 64, 64, 129];
+            std::fs::write(&path, [head.as_bytes(), &texels].concat()).expect("it can be written");
+            let EnvironmentSource::Image { width: 2, height: 1, texels } =
+                read(&path, &mut Vec::new()).unwrap_or_else(|error| panic!("{program}: {error}"))
+            else {
+                panic!("{program}: it is an image of two texels")
+            };
+            assert!(texels[0][0] == 2.0 * texels[1][0] && (texels[0][0] - 1.0).abs() < 0.01, "{program}: {texels:?}");
+        }
+    }
 }

@@ -7,18 +7,23 @@ use crate::scene::folder::Folder;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// Hash of the scene file at `scene` and of the existing files that it names. Files outside the scene's folder are
-/// skipped unless `allow_outside`.
+/// Hash of the scene file at `scene` and of the files that it names, each with its length, or as missing. Files outside
+/// the scene's folder are skipped unless `allow_outside`.
 ///
 /// # Errors
 /// The scene file cannot be read.
 pub fn hash(scene: &Path, allow_outside: bool) -> Result<String> {
     let bytes = std::fs::read(scene).map_err(|cause| Error::io(scene, &cause))?;
     let mut hasher = blake3::Hasher::new();
-    hasher.update(&bytes);
-    let named = files(&bytes, scene, allow_outside);
-    for bytes in named.iter().filter(|path| path.is_file()).filter_map(|path| std::fs::read(path).ok()) {
-        hasher.update(&bytes);
+    let mut add = |bytes: Option<&[u8]>| {
+        // Without the lengths, bytes that move from one file to the next would not change the hash.
+        hasher.update(&bytes.map_or(u64::MAX, |bytes| bytes.len() as u64).to_le_bytes());
+        hasher.update(bytes.unwrap_or_default());
+    };
+    add(Some(&bytes));
+    for path in files(&bytes, scene, allow_outside) {
+        let file = path.is_file().then(|| std::fs::read(path).ok()).flatten();
+        add(file.as_deref());
     }
     Ok(hasher.finalize().to_hex().to_string())
 }
@@ -47,5 +52,30 @@ fn collect(json: &Value, folder: Folder, found: &mut Vec<PathBuf>) {
             }
         }
         _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The hash changes when bytes move between two files, when a file is emptied, and when it is removed.
+    #[test]
+    fn the_hash_of_a_scene_tells_where_a_file_ends() {
+        let temporary = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| temporary.path().join(name);
+        let scene = r#"{"buffers": [{"uri": "a.bin"}, {"uri": "b.bin"}]}"#;
+        std::fs::write(at("a.gltf"), scene).expect("it can be written");
+        let cases = [("ab", Some("cd")), ("abc", Some("d")), ("abcd", Some("")), ("abcd", None), ("", Some("abcd"))];
+        let hashes = cases.map(|(a, b)| {
+            std::fs::write(at("a.bin"), a).expect("it can be written");
+            match b {
+                Some(b) => std::fs::write(at("b.bin"), b).expect("it can be written"),
+                None => std::fs::remove_file(at("b.bin")).expect("it is there"),
+            }
+            hash(&at("a.gltf"), false).expect("it can be read")
+        });
+        let different: std::collections::BTreeSet<&String> = hashes.iter().collect();
+        assert_eq!(different.len(), cases.len());
     }
 }

@@ -4,6 +4,9 @@ use crate::error::{Error, ErrorKind, Result};
 use serde::Deserialize;
 use std::path::Path;
 
+/// Longest text of another program in a message, in characters.
+const MAX_LENGTH: usize = 500;
+
 /// An error as the USD converter prints it, in JSON.
 #[derive(Deserialize)]
 struct Fault {
@@ -28,7 +31,8 @@ pub fn failure(stderr: &[u8], stage: &Path) -> Error {
     let fault = stderr.lines().rev().find_map(|line| serde_json::from_str::<Fault>(line).ok());
     let Some(Fault { prim, fault, hint }) = fault else {
         let last = stderr.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("it says nothing");
-        let cause = format!("the converter (scripts/usd) failed: {}", last.trim());
+        let shortened: String = last.trim().chars().take(MAX_LENGTH).collect();
+        let cause = format!("the converter (scripts/usd) failed: {shortened}");
         return Error::new(ErrorKind::Scene, stage.display(), cause).hint("'caustique doctor' lists what is found");
     };
     Error { hint, ..Error::new(ErrorKind::Scene, prim, fault).within(stage.display()) }
