@@ -79,6 +79,8 @@ class Reader:
                     self.guarded(node, lambda node=node: self.emitter(node))
                 case "sensor":
                     self.guarded(node, lambda node=node: self.sensor(node))
+                case "integrator":
+                    self.guarded(node, lambda node=node: self.integrator(node))
                 case "bsdf" | "texture" | "medium" | "ref" | "spectrum" | "volume" | "phase":
                     # References use them.
                     pass
@@ -89,6 +91,16 @@ class Reader:
             self.lose(f"{count}; they reflect from both sides, and Mitsuba renders their backs black")
         for node in self.document.elements:
             self.name_unread(node)
+
+    def integrator(self, node):
+        """Name the settings of an integrator that change the light, and that the file cannot carry."""
+        for inner in node.all("integrator"):
+            self.integrator(inner)
+        longest = 2 if node.type == "direct" else node.whole("max_depth", -1, -1, 2**31 - 1)
+        if longest >= 0:
+            self.lose(f"{node.title}: its longest path of {longest} is not carried: render with --max-depth {longest}")
+        if node.boolean("hide_emitters"):
+            self.lose(f"{node.title}: hide_emitters is left out: cameras see the lights")
 
     def guarded(self, node, read):
         """Read an element; errors of Mitsuba and numpy name it."""

@@ -155,7 +155,8 @@ def sun(described, scale):
 def medium(node):
     """A homogeneous medium, or None with a warning."""
     if node.type != "homogeneous":
-        node.drop("a medium of this type is left out; known is homogeneous")
+        density = " (extras.caustique.medium.density names a .vol file)" if node.type == "heterogeneous" else ""
+        node.drop(f"a medium whose density varies over space is not imported{density}")
         return None
     scale = node.number("scale", 1.0)
     if node.child("material") is not None:

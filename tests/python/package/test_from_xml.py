@@ -94,6 +94,31 @@ class Reads(unittest.TestCase):
         glow = '<shape type="disk"><emitter type="area"><rgb name="radiance" value="1"/></emitter></shape>'
         self.document(self.write(CAMERA + glow))
 
+    def test_settings_of_the_integrator_that_change_the_light_are_losses(self):
+        for integrator, said in [
+            ('<integrator type="path"><integer name="max_depth" value="2"/></integrator>', ["--max-depth 2"]),
+            ('<integrator type="path"><integer name="max_depth" value="-1"/></integrator>', []),
+            ('<integrator type="direct"/>', ["--max-depth 2"]),
+            ('<integrator type="aov"><integrator type="path"><integer name="max_depth" value="7"/></integrator></integrator>',
+             ["--max-depth 7"]),
+            ('<integrator type="path"><boolean name="hide_emitters" value="true"/></integrator>', ["hide_emitters"]),
+        ]:
+            with self.subTest(integrator):
+                losses = self.losses(integrator)
+                self.assertEqual(len(losses), len(said), losses)
+                self.assertTrue(all(word in loss for word, loss in zip(said, losses)), losses)
+
+    def test_media_whose_density_varies_are_named(self):
+        grid = '<volume type="gridvolume" name="sigma_t"><string name="filename" value="smoke.vol"/></volume>'
+        cube = '<shape type="cube"><bsdf type="null"/><medium type="{}" name="interior">{}</medium></shape>'
+        for kind, reason in (("heterogeneous", "density varies over space"), ("homogeneous", "varies over space")):
+            losses = self.losses(cube.format(kind, grid))
+            self.assertTrue(any(reason in loss for loss in losses), losses)
+
+    def losses(self, inside):
+        """The losses of a scene with a camera, a light and this."""
+        return self.document(self.write(CAMERA + LIGHT + inside))["scenes"][0]["extras"]["caustique"]["losses"]
+
     def test_the_documented_command_is_not_refused(self):
         text = (ROOT / "docs" / "researchers.md").read_text()
         scene = text.split("mitsuba.py export ")[1].split()[0]
