@@ -4,7 +4,6 @@ import math
 
 from pxr import UsdGeom
 
-from faults import Fault
 from stage import custom_keys
 
 # Attributes with the schema's defaults, which USD does not return for a blocked attribute (`= None`).
@@ -17,8 +16,9 @@ def node(prim, stage, document, aspect=None, policy="expandAperture", lens=True)
     # In tenths of the stage's unit.
     width, height, focal = (float(get(camera.GetPrim().GetAttribute(name), default)) for name, default in _DEFAULTS)
     if not all(math.isfinite(x) and x > 0 for x in (width, height, focal)):
-        raise Fault(where, f"its apertures are {width:g} and {height:g}, its focal length {focal:g}",
-                    "they have to be above zero")
+        stage.losses.add(where, f"its apertures are {width:g} and {height:g}, its focal length {focal:g}, which are not all "
+                          "above zero: the defaults are taken")
+        width, height, focal = (default for _, default in _DEFAULTS)
     offsets = [float(get(a, 0.0)) for a in (camera.GetHorizontalApertureOffsetAttr(),
                                             camera.GetVerticalApertureOffsetAttr())]
     if aspect is not None:
@@ -65,8 +65,6 @@ def shutter(prim, stage):
     """The times at which the shutter of a camera opens and closes, relative to the frame; None if nothing moves then."""
     camera, get = UsdGeom.Camera(prim), stage.get
     times = [float(get(a, 0.0)) for a in (camera.GetShutterOpenAttr(), camera.GetShutterCloseAttr())]
-    if not all(map(math.isfinite, times)):
-        raise Fault(prim.GetPath(), f"its shutter opens at {times[0]} and closes at {times[1]}", "give it two numbers")
     if times[0] >= times[1] or not stage.moves():
         return None
     if not stage.has_frame:
@@ -80,6 +78,6 @@ def exposure(prim, stage):
     camera = UsdGeom.Camera(prim)
     scale = camera.ComputeLinearExposureScale(stage.time)
     if not math.isfinite(scale):
-        raise Fault(prim.GetPath(), f"its exposure brightens by {scale}", "look at its exposure, exposure:time, :iso, "
-                    ":fStop and :responsivity")
+        stage.losses.add(prim.GetPath(), f"its exposure brightens by {scale}: it is ignored")
+        return 0.0
     return math.log2(scale) if scale > 0 and scale != 1 else 0.0

@@ -90,7 +90,8 @@ def _convert(given):
     except MemoryError:
         where, what, hint = "", "the stage takes more memory than there is", "use a simpler stage or smaller textures"
     except Exception as error:  # USD raises many kinds of errors about invalid stages
-        where, what, hint = "", f"USD says: {text_of(error)}", None
+        fault = Fault("", f"USD says: {text_of(error)}")
+        where, what, hint = fault.where, fault.fault, fault.hint
     return _print_error(where, what, hint)
 
 

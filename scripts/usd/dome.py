@@ -8,7 +8,7 @@ import OpenEXR
 from pxr import Gf
 
 import textures
-from faults import Fault
+from faults import Fault, Invalid
 from lights import Light
 from stage import custom_keys, kind_of
 
@@ -35,7 +35,11 @@ class Dome:
             return
         if light.normalized:
             light.add_loss("inputs:normalize says nothing of a dome light")
-        self.keys = {"color": list(light.emitted())} if plain else self._image(light, asset, matrix)
+        self.keys = {"color": list(light.emitted())}
+        try:
+            self.keys = self.keys if plain else self._image(light, asset, matrix)
+        except Invalid as invalid:
+            light.add_loss(f"{invalid.fault}: it shines with its colour alone")
         self.keys.update(custom_keys(prim, self._stage))
 
     def _image(self, light, asset, matrix):

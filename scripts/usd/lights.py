@@ -11,7 +11,7 @@ import numpy
 from pxr import Gf, UsdLux
 
 import shapes
-from faults import Fault
+from faults import Invalid
 from materials import set_emission
 from stage import custom_keys
 
@@ -61,7 +61,7 @@ class Light:
             color = Gf.CompMult(color, UsdLux.BlackbodyTemperatureAsRgb(self.get("colorTemperature", 6500.0)))
         emitted = tuple(float(c) * power for c in color)
         if not all(math.isfinite(c) for c in emitted):
-            raise Fault(self.where, "its colour or intensity is not finite", "give it numbers")
+            raise Invalid(self.where, "its colour or intensity is not finite", "give it numbers")
         return emitted
 
     def radiance(self, area):
@@ -119,7 +119,7 @@ def _sphere(light, document, matrix):
     radius = 0.0 if as_point and light.normalized else float(light.get("radius", 0.5))
     a, b, c = (radius * length for length in _axis_lengths(matrix))
     if radius < 0 or not math.isfinite(a + b + c):
-        raise Fault(light.where, f"its radius is {radius}", "give it a number that is not negative")
+        raise Invalid(light.where, f"its radius is {radius}", "give it a number that is not negative")
     if radius > 0 and max(a, b, c) > 1.001 * min(a, b, c):
         return _ellipsoid(light, document, radius, (a, b, c))
     if as_point and not light.normalized:
@@ -133,7 +133,12 @@ def _sphere(light, document, matrix):
     entry = {"name": str(light.where), "type": "point", **_strength(intensity)}
     keys, cone, profile = {"radius": a * light.stage.metres}, light.cone(profile=True), light.profile()
     if profile is not None:
-        data, _ = light.stage.asset(light.prim, profile)
+        try:
+            data, _ = light.stage.asset(light.prim, profile)
+        except Invalid as invalid:
+            light.add_loss(f"its IES profile is left out: {invalid.fault}")
+            profile = None
+    if profile is not None:
         # Horizontal angles run from the light's X axis to its Y axis, as in hdEmbree.
         keys["ies"] = {"bufferView": document.profile(data)}
         scale = float(light.get("shaping:ies:angleScale", 0.0))

@@ -9,7 +9,7 @@ from network import Primvar, Reader, Texture
 from pxr import UsdShade
 from stage import custom_keys, finite
 from surface import Surface
-from faults import Fault
+from faults import Fault, Invalid
 from textures import Textures
 
 
@@ -32,7 +32,8 @@ class Materials:
 
     def __init__(self, stage, document):
         self._stage, self._document = stage, document
-        self._reader, self._textures = Reader(stage), Textures(stage, document)
+        self._textures = Textures(stage, document)
+        self._reader = Reader(stage, self._textures)
         self._mesh_materials, self._surfaces = {}, {}
 
     def bound(self, prim):
@@ -47,11 +48,15 @@ class Materials:
         `light_radiance`: radiance (3 numbers) of a light on the mesh, or None. `fades`: whether the mesh has
         displayOpacity."""
         where = material.GetPath() if material else None
+        key = (where, closed, light_radiance, fades)
         try:
-            closed = closed or self._surface(material).transmission == 0
+            closed = closed or not self._surface(material).has_inside
             key = (where, closed, light_radiance, fades)
             if key not in self._mesh_materials:
                 self._mesh_materials[key] = self._convert(material, closed, light_radiance, fades)
+        except Invalid as invalid:
+            self._stage.losses.add(invalid.where or where, f"{invalid.fault}: displayColor takes the place of its material")
+            self._mesh_materials[key] = self._convert(None, closed, light_radiance, fades)
         except Fault as fault:
             raise fault if fault.where else Fault(where, fault.fault, fault.hint)
         return self._mesh_materials[key]
@@ -63,6 +68,7 @@ class Materials:
             surface = copy.copy(surface)
             surface.emission = light_radiance
         entry, sets = {"name": name}, []
+        surface = self._below(surface, closed, entry)
         color = surface.base.name if isinstance(surface.base, Primvar) else None
         self._base_properties(surface, entry, sets)
         self._normal(surface, entry, sets)
@@ -205,6 +211,8 @@ class Materials:
                                         "sheenRoughnessFactor": surface.sheen_roughness})
             if surface.sheen_model != "charlie":
                 keys.setdefault("sheen_model", surface.sheen_model)
+        if surface.sheet:
+            self._diffuse_transmission(surface, entry, sets, add)
         if surface.transmission == 0:
             return
         add("KHR_materials_transmission", self._textured(entry, sets, {"transmission": (surface.transmission, 0)}))
@@ -219,6 +227,59 @@ class Materials:
             add("KHR_materials_dispersion", {"dispersion": surface.dispersion})
         if any(surface.scatter) and not thin and "medium" not in keys:
             keys["medium"] = _medium(surface, self._stage.metres)
+
+    def _below(self, surface, closed, entry):
+        """The surface with the base colour of the diffuse light that does not pass it, and the share that does, `sheet`."""
+        share, color = surface.subsurface, surface.subsurface_color
+        surface = copy.copy(surface)
+        surface.sheet = 0.0
+        if not share:
+            return surface
+        if surface.transmission != 0:
+            self._add_loss(entry, "subsurface scattering is not carried beside transmission")
+        elif surface.thin:
+            # Half of the light that scatters in a thin sheet leaves on either side, or more ahead by its anisotropy.
+            surface.sheet = share * (1 + surface.subsurface_g) / 2
+            surface.base = self._mixed(entry, surface.base, color, (share - surface.sheet) / (1 - surface.sheet))
+        elif closed:
+            surface.sheet = share
+        else:
+            self._add_loss(entry, "subsurface scattering needs a closed mesh, and one that uses it has holes: it is diffuse "
+                           "there")
+            surface.base = self._mixed(entry, surface.base, color, share)
+        return surface
+
+    def _mixed(self, entry, first, second, share):
+        """A colour with this share of `second`; the one with the larger share, with a loss, if they vary."""
+        if share in (0.0, 1.0) or first == second:
+            return second if share == 1.0 else first
+        if isinstance(first, tuple) and isinstance(second, tuple):
+            return tuple(a + (b - a) * share for a, b in zip(first, second))
+        self._add_loss(entry, "colours of its base and its subsurface scattering that vary are not mixed: the stronger one "
+                       "is taken")
+        return second if share >= 0.5 else first
+
+    def _diffuse_transmission(self, surface, entry, sets, add):
+        """Set the light that passes a thin sheet, or that scatters inside of a closed mesh."""
+        solid, color = not surface.thin, surface.subsurface_color
+        content = {"diffuseTransmissionFactor": surface.sheet}
+        if isinstance(color, Texture):
+            seen = (lambda c: _medium_color(c, surface)) if solid else (lambda c: c)
+            image, color = self._textures.tint(color, seen, 0.5 if solid else 1.0)
+            content["diffuseTransmissionColorTexture"] = self._textures.reference(surface.subsurface_color, sets, image)
+        elif solid:
+            color = [float(_medium_color(c, surface)) for c in color]
+        content["diffuseTransmissionColorFactor"] = [1.0] * 3 if solid else self._clip(entry, "subsurface colour", color)
+        add("KHR_materials_diffuse_transmission", content)
+        if not solid:
+            return
+        paths = [max(r, 1e-6) * self._stage.metres for r in surface.subsurface_radius]
+        # Channels whose paths differ by more would underflow.
+        paths = [max(path, max(paths) / 100) for path in paths]
+        add("KHR_materials_volume", {"thicknessFactor": 1.0, "attenuationDistance": min(paths),
+                                     "attenuationColor": [math.exp(-min(paths) / path) for path in paths]})
+        add("KHR_materials_volume_scatter", {"multiscatterColor": self._clip(entry, "subsurface colour", color),
+                                             "scatterAnisotropy": surface.subsurface_g})
 
     def _coat(self, surface, entry, sets, keys):
         """Set the colour and the index of a coat."""
@@ -262,10 +323,22 @@ class Materials:
 
     def _check(self, entry, what, values):
         if not finite(values):
-            raise Fault(entry["name"], f"its {what} is not finite", "give it numbers")
+            raise Invalid(entry["name"], f"its {what} is not finite", "give it numbers")
 
     def _add_loss(self, entry, what):
         self._stage.losses.add(entry["name"], what)
+
+
+def _medium_color(color, surface):
+    """The colour of a medium with which light that enters it leaves with `color`, a number or an array.
+
+    The surface reflects a part of the light from inside back: by its facets (their mean reflectance by the fit of [Kulla
+    and Conty 2017]), and diffusely, by the share that it does not transmit.
+    """
+    facets = surface.specular * (surface.ior - 1) / (4.08567 + 1.00071 * surface.ior) if surface.ior > 1 else 0.0
+    base = sum(surface.base) / 3 if isinstance(surface.base, tuple) else 0.5
+    inside = facets + (1 - facets) * (1 - surface.sheet) * base
+    return color / ((1 - facets) * surface.sheet + color * inside)
 
 
 def set_emission(document, entry, radiance):

@@ -22,6 +22,8 @@ _NAMES = {
         "emission": ("emission_luminance", 0.0), "emission_color": ("emission_color", (1.0,) * 3),
         "presence": ("geometry_opacity", 1.0), "thin": ("geometry_thin_walled", False),
         "normal": ("geometry_normal", None), "subsurface": ("subsurface_weight", 0.0),
+        "subsurface_color": ("subsurface_color", (0.8,) * 3), "subsurface_radius": ("subsurface_radius_scale", (1.0, 0.5, 0.25)),
+        "subsurface_scale": ("subsurface_radius", 1.0), "subsurface_g": ("subsurface_scatter_anisotropy", 0.0),
         "film": ("thin_film_weight", 0.0), "film_thickness": ("thin_film_thickness", 0.5),
         "film_ior": ("thin_film_ior", 1.4), "diffuse_roughness": ("base_diffuse_roughness", 0.0),
     },
@@ -38,24 +40,24 @@ _NAMES = {
         "sheen_color": ("sheen_color", (1.0,) * 3), "sheen_roughness": ("sheen_roughness", 0.3),
         "emission": ("emission", 0.0), "emission_color": ("emission_color", (1.0,) * 3),
         "presence": ("opacity", (1.0,) * 3), "thin": ("thin_walled", False), "normal": ("normal", None),
-        "subsurface": ("subsurface", 0.0), "film": (None, 1.0),
+        "subsurface": ("subsurface", 0.0), "subsurface_color": ("subsurface_color", (1.0,) * 3),
+        "subsurface_radius": ("subsurface_radius", (1.0,) * 3), "subsurface_scale": ("subsurface_scale", 1.0),
+        "subsurface_g": ("subsurface_anisotropy", 0.0), "film": (None, 1.0),
         "film_thickness": ("thin_film_thickness", 0.0), "film_ior": ("thin_film_IOR", 1.5),
         "diffuse_roughness": ("diffuse_roughness", 0.0),
     },
 }
 _FILM_UNITS = {OPEN_PBR: 1000.0, STANDARD: 1.0}  # unit of a film's thickness (nm)
-_LOST = {
-    "subsurface": "subsurface scattering is not carried: the surface is diffuse",
-}
 # {quantity: quantity that must not be 0 for it to have an effect}
 _DEPENDS_ON = {
     "inside": "transmission", "depth": "transmission", "scatter": "transmission", "scatter_g": "transmission",
     "abbe": "transmission", "dispersed": "transmission", "coat_roughness": "coat", "coat_color": "coat",
-    "coat_ior": "coat",
+    "coat_ior": "coat", "subsurface_color": "subsurface", "subsurface_radius": "subsurface",
+    "subsurface_scale": "subsurface", "subsurface_g": "subsurface",
     "film_thickness": "film", "film_ior": "film", "sheen_color": "sheen", "sheen_roughness": "sheen", "emission_color": "emission",
 }
 _TEXTURED = {"base", "metal", "roughness", "normal", "emission_color", "presence", "coat", "coat_roughness",
-             "coat_color", "coat_ior", "diffuse_roughness", "film_thickness", "transmission"}
+             "coat_color", "coat_ior", "diffuse_roughness", "film_thickness", "transmission", "subsurface_color"}
 
 
 def surface(shader, reader, losses):
@@ -72,9 +74,6 @@ def surface(shader, reader, losses):
             losses.add(where, f"what feeds {name} is not carried: it has its default")
             value = default
         given[key] = value
-    for key, what in _LOST.items():
-        if given[key]:
-            losses.add(where, what)
     presence = given["presence"]
     if isinstance(presence, tuple):
         presence = sum(presence) / 3
@@ -92,6 +91,10 @@ def surface(shader, reader, losses):
         out.sheen_model = "fibers" if reader.identifier(shader) == OPEN_PBR else "charlie"
         out.sheen = _scaled(given["sheen_color"], given["sheen"])
         out.sheen_roughness = given["sheen_roughness"]
+    if given["subsurface"]:
+        out.subsurface, out.subsurface_color = min(max(given["subsurface"], 0.0), 1.0), given["subsurface_color"]
+        out.subsurface_radius = _scaled(given["subsurface_radius"], given["subsurface_scale"])
+        out.subsurface_g = min(max(given["subsurface_g"], -0.99), 0.99)
     _set_interior(out, given, where, losses)
     return out
 

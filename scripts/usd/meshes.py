@@ -4,7 +4,7 @@ import mapbox_earcut
 import numpy
 from pxr import UsdGeom
 
-from faults import Fault
+from faults import Invalid
 
 _GREY = (0.18, 0.18, 0.18)
 
@@ -21,13 +21,13 @@ class Faces:
         self.counts = numpy.asarray(counts, numpy.int64)
         self.corners = numpy.asarray(corners, numpy.int64)
         if self.counts.sum() != len(self.corners) or (self.counts < 0).any():
-            raise Fault(where, f"faceVertexCounts adds up to {self.counts.sum()}, and faceVertexIndices has "
+            raise Invalid(where, f"faceVertexCounts adds up to {self.counts.sum()}, and faceVertexIndices has "
                         f"{len(self.corners)} numbers", "export the mesh again")
         if len(self.corners) and not 0 <= self.corners.min() <= self.corners.max() < len(self.points):
-            raise Fault(where, f"faceVertexIndices names a point beyond its {len(self.points)} points",
+            raise Invalid(where, f"faceVertexIndices names a point beyond its {len(self.points)} points",
                         "export the mesh again")
         if not (numpy.abs(self.points) <= numpy.finfo(numpy.float32).max).all():
-            raise Fault(where, "points has a coordinate that is not finite", "export the mesh again")
+            raise Invalid(where, "points has a coordinate that is not finite", "export the mesh again")
         self.face_of_corner = numpy.repeat(numpy.arange(len(self.counts)), self.counts)
         self._mirrored = mirrored
 
@@ -41,11 +41,11 @@ class Faces:
             UsdGeom.Tokens.faceVarying: (len(self.corners), lambda: numpy.arange(len(self.corners))),
         }
         if interpolation not in sources:
-            raise Fault(self.where, f"{name} has an interpolation {interpolation}",
+            raise Invalid(self.where, f"{name} has an interpolation {interpolation}",
                         f"it is one of {', '.join(sources)}")
         expected, index = sources[interpolation]
         if len(values) != expected:
-            raise Fault(self.where, f"{name} has {len(values)} values, and {interpolation} interpolation takes "
+            raise Invalid(self.where, f"{name} has {len(values)} values, and {interpolation} interpolation takes "
                         f"{expected}", "export the mesh again")
         return values[index()]
 
@@ -150,6 +150,21 @@ def primvar(prim, name, stage):
     return values.reshape(len(values), -1) if values.ndim else values.reshape(1, 1), found.GetInterpolation()
 
 
+def expanded(found, name, faces, stage, fallback):
+    """The values (corners, width) of a primvar that `primvar` found, at each corner. If their number is wrong, there is a
+    loss, and all are `fallback`."""
+    values, interpolation = found
+    if interpolation == UsdGeom.Tokens.constant and len(values) > 1:
+        stage.losses.add(faces.where, f"{name} has {len(values)} values, and constant interpolation takes 1: the first is "
+                          "taken")
+        values = values[:1]
+    try:
+        return faces.expand(values, interpolation, name)
+    except Invalid as fault:
+        stage.losses.add(faces.where, f"{fault.fault}: it is left out")
+        return numpy.tile(fallback, (len(faces.corners), 1))
+
+
 def authored_normals(prim, faces, stage):
     """Authored normals at each corner, from primvars:normals, else normals; None if absent or of the wrong length."""
     found = primvar(prim, "normals", stage)
@@ -165,7 +180,7 @@ def authored_normals(prim, faces, stage):
         return None
     try:
         return faces.expand(*found, "normals")
-    except Fault as fault:
+    except Invalid as fault:
         stage.losses.add(prim.GetPath(), f"{fault.fault}: they are left out, and its faces are flat")
         return None
 
@@ -175,9 +190,11 @@ def colours(prim, name, faces, stage):
     found = primvar(prim, name, stage)
     if found is not None and found[0].shape[1] < 3:
         found = numpy.repeat(found[0][:, :1], 3, axis=1), found[1]
-    rgb = numpy.tile(_GREY, (len(faces.corners), 1)) if found is None else faces.expand(*found, name)[:, :3]
+    rgb = numpy.tile(_GREY, (len(faces.corners), 1)) if found is None else \
+        expanded(found, name, faces, stage, _GREY)[:, :3]
     opacity = primvar(prim, "displayOpacity", stage) if name == "displayColor" else None
-    alpha = numpy.ones((len(rgb), 1)) if opacity is None else faces.expand(*opacity, "displayOpacity")[:, :1]
+    alpha = numpy.ones((len(rgb), 1)) if opacity is None else \
+        expanded(opacity, "displayOpacity", faces, stage, (1.0,))[:, :1]
     return numpy.concatenate([rgb, alpha], axis=1)
 
 

@@ -43,8 +43,8 @@ class Primvar:
 class Reader:
     """Reads the inputs of shaders at the stage's time code."""
 
-    def __init__(self, stage):
-        self.stage = stage
+    def __init__(self, stage, textures):
+        self.stage, self._textures = stage, textures
         self._open = []  # stack of inputs that are being read
 
     def read(self, shader, name, default=None):
@@ -176,10 +176,11 @@ class Reader:
                        uv=uv, transform=transform)
 
     def _asset(self, shader):
-        """The Sdf.AssetPath of `inputs:file`, also through an interface input; None if unset."""
+        """The Sdf.AssetPath of `inputs:file`, also through an interface input; None if unset, or with a loss if the file
+        is no image."""
         for attribute in shader.GetInput("file").GetValueProducingAttributes() if shader.GetInput("file") else ():
             asset = self.stage.get(attribute)
-            if isinstance(asset, Sdf.AssetPath) and asset.path:
+            if isinstance(asset, Sdf.AssetPath) and asset.path and self._textures.check(shader.GetPrim(), asset):
                 return asset
         return None
 

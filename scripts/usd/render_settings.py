@@ -83,13 +83,22 @@ class Settings:
 
     def aspect(self):
         """Aspect ratio of the displayed picture, or None."""
-        resolution = self.get("resolution")
+        resolution = self._resolution()
         if resolution is None:
             return None
         pixel = self.get("pixelAspectRatio", 1.0)
         if pixel <= 0:
-            raise Fault(self.prim.GetPath(), f"its pixelAspectRatio is {pixel}", "it has to be above zero")
+            self._stage.losses.add(self.prim.GetPath(), f"its pixelAspectRatio is {pixel}: it is ignored")
+            pixel = 1.0
         return resolution[0] / resolution[1] * pixel
+
+    def _resolution(self):
+        """Width and height of the picture, or None."""
+        resolution = self.get("resolution")
+        if resolution is not None and min(resolution) < 1:
+            self._stage.losses.add(self.prim.GetPath(), f"its resolution is {resolution}: it is ignored")
+            return None
+        return resolution
 
     def policy(self):
         """The policy that conforms a camera to the picture's aspect ratio."""
@@ -98,17 +107,17 @@ class Settings:
     def keys(self):
         """Keys for the scene's `extras.caustique`."""
         out = {"light_units": "radiometric"}
-        resolution = self.get("resolution")
+        resolution = self._resolution()
         if resolution is not None:
-            if min(resolution) < 1:
-                raise Fault(self.prim.GetPath(), f"its resolution is {resolution}", "give it two numbers above zero")
             out["resolution"] = [int(resolution[0]), int(resolution[1])]
         window = self.get("dataWindowNDC")
-        if window is not None and tuple(window) != (0, 0, 1, 1):
-            out["crop"] = self._crop(window)
+        crop = self._crop(window) if window is not None and tuple(window) != (0, 0, 1, 1) else None
+        if crop:
+            out["crop"] = crop
         rate = self._stage.stage.GetTimeCodesPerSecond()
         if not math.isfinite(rate):
-            raise Fault("/", f"timeCodesPerSecond is {rate}", "give it a number")
+            self._stage.losses.add("/", f"timeCodesPerSecond is {rate}: it is taken as 24")
+            rate = 24.0
         rate = fractions.Fraction(f"{rate:.6g}")
         if rate > 0:
             out["frame_rate"] = [rate.numerator, rate.denominator]
@@ -118,14 +127,15 @@ class Settings:
         return out
 
     def _crop(self, window):
-        """Convert (xmin, ymin, xmax, ymax) from the bottom left to left, top, width and height."""
+        """Convert (xmin, ymin, xmax, ymax) from the bottom left to left, top, width and height; None if it is empty."""
         left, low, right, high = window
         inside = [min(max(x, 0.0), 1.0) for x in (left, low, right, high)]
         if inside != [left, low, right, high]:
             self._stage.losses.add(self.prim.GetPath(), "its dataWindowNDC reaches beyond the picture: it is cut there")
         left, low, right, high = inside
         if right <= left or high <= low:
-            raise Fault(self.prim.GetPath(), "its dataWindowNDC is empty", "it is xmin, ymin, xmax, ymax")
+            self._stage.losses.add(self.prim.GetPath(), "its dataWindowNDC is empty: it is ignored")
+            return None
         return [left, 1 - high, right - left, high - low]
 
     def arguments(self):

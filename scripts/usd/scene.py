@@ -1,5 +1,7 @@
 """Converts a stage to a document: traverses its prims and adds a node for each visible one."""
 
+import math
+
 import numpy
 from pxr import Gf, UsdGeom, UsdLux, UsdShade
 
@@ -9,7 +11,7 @@ import meshes
 import shapes
 from document import Document
 from dome import Dome, is_dome
-from faults import Fault
+from faults import Invalid
 from materials import Materials
 from render_settings import Settings
 from stage import PREDICATE, custom_keys
@@ -30,6 +32,7 @@ class Scene:
         self._meshes = {}
         self._cameras = []
         self._within = []  # stack of instancers whose prototypes are being visited
+        self._lit = False  # whether there is a light of any kind, shown or hidden: then there is no studio
 
     def fill(self):
         """Traverse the whole USD stage and add its visible prims to the glTF document."""
@@ -42,12 +45,19 @@ class Scene:
         self._settings.arguments()  # the program reads these; here they record their losses
         if self._dome.keys is not None:
             keys["environment"] = self._dome.keys
-        keys.setdefault("environment", {"color": [0.0] * 3})
+        elif self._lit:
+            keys.setdefault("environment", {"color": [0.0] * 3})
         keys["losses"] = self._stage.losses.lines
         self.document.json["scenes"][0]["extras"] = {"caustique": keys}
 
+    def _add_loss(self, invalid):
+        self._stage.losses.add(invalid.where, f"{invalid.fault}: it is left out ({invalid.hint})")
+
     def _place(self, make, matrix):
-        made = make(matrix)
+        try:
+            made = make(matrix)
+        except Invalid as invalid:
+            return self._add_loss(invalid)
         if made is not None:
             world = matrix * self._stage.to_world
             self.document.node({**made, "matrix": [float(x) for row in world for x in row]})
@@ -71,11 +81,16 @@ class Scene:
         rest, get = [(prim, above, shown, purpose, own_transform)], self._stage.get
         while rest:  # no recursion, because stages may be deeper than Python's limit
             prim, matrix, shown, purpose, own_transform = rest.pop()
+            self._lit = self._lit or prim.HasAPI(UsdLux.LightAPI)
             if own_transform and prim.IsA(UsdGeom.Xformable):
                 xformable = UsdGeom.Xformable(prim)
                 local = xformable.GetLocalTransformation(self._stage.time)
                 matrix = local if xformable.GetResetXformStack() else local * matrix
-                _check_matrix(prim.GetPath(), matrix, "look at its xformOps")
+                try:
+                    _check_matrix(prim.GetPath(), matrix, "look at its xformOps")
+                except Invalid as invalid:
+                    self._add_loss(invalid)
+                    continue
             if prim.IsA(UsdGeom.Imageable):
                 imageable = UsdGeom.Imageable(prim)
                 shown = shown and get(imageable.GetVisibilityAttr()) != UsdGeom.Tokens.invisible
@@ -84,7 +99,10 @@ class Scene:
             if prim.IsA(UsdGeom.Camera):
                 self._cameras.append((prim, matrix))
             elif shown and purpose in purposes:
-                yield from self._visible(prim, matrix, purposes)
+                try:
+                    yield from self._visible(prim, matrix, purposes)
+                except Invalid as invalid:
+                    self._add_loss(invalid)
             if not prim.IsA(UsdGeom.PointInstancer):
                 rest += [(child, matrix, shown, purpose, True) for child in prim.GetFilteredChildren(PREDICATE)][::-1]
 
@@ -112,12 +130,12 @@ class Scene:
         targets = instancer.GetPrototypesRel().GetForwardedTargets()
         indices = stage.get(instancer.GetProtoIndicesAttr(), ())
         if len(indices) and not 0 <= min(indices) <= max(indices) < len(targets):
-            raise Fault(where, f"protoIndices names a prototype beyond its {len(targets)}", "export it again")
+            raise Invalid(where, f"protoIndices names a prototype beyond its {len(targets)}", "export it again")
         mask = instancer.ComputeMaskAtTime(stage.time)
         places = instancer.ComputeInstanceTransformsAtTime(
             stage.time, stage.time, UsdGeom.PointInstancer.IncludeProtoXform, UsdGeom.PointInstancer.IgnoreMask)
         if len(places) != len(indices):
-            raise Fault(where, f"it has {len(indices)} protoIndices, and positions for {len(places)}",
+            raise Invalid(where, f"it has {len(indices)} protoIndices, and positions for {len(places)}",
                         "export it again")
         if any(primvar.HasAuthoredValue() for primvar in UsdGeom.PrimvarsAPI(prim).GetPrimvars()):
             stage.losses.add(where, "primvars of its copies are not carried: all look alike")
@@ -127,10 +145,12 @@ class Scene:
                 continue
             if index not in parts:
                 prototype = stage.stage.GetPrimAtPath(targets[index])
+                parts[index] = []
                 if not prototype:
-                    raise Fault(where, f"its prototype {targets[index]} is not there", "name a prim of the stage")
+                    stage.losses.add(where, f"its prototype {targets[index]} is not there: its copies are left out")
+                    continue
                 if where in self._within:
-                    raise Fault(where, "it is a part of its own prototypes", "take it out of them")
+                    raise Invalid(where, "it is a part of its own prototypes", "take it out of them")
                 self._within.append(where)
                 parts[index] = list(self._walk(prototype, Gf.Matrix4d(1), True, "default", purposes, False))
                 self._within.pop()
@@ -211,9 +231,10 @@ class Scene:
             self._stage.losses.add(where, "a subset of anything but faces is not carried")
             return []
         chosen = numpy.asarray(self._stage.get(subset.GetIndicesAttr(), ()), numpy.int64)
-        if len(chosen) and not 0 <= chosen.min() <= chosen.max() < count:
-            raise Fault(where, f"its indices name a face beyond the mesh's {count}", "export the mesh again")
-        return chosen
+        inside = (chosen >= 0) & (chosen < count)
+        if not inside.all():
+            self._stage.losses.add(where, f"its indices name a face beyond the mesh's {count}: they are left out")
+        return chosen[inside]
 
     def _normals(self, prim, faces):
         """Normals at each corner; None for flat faces; "smooth" for a subdivision surface."""
@@ -229,6 +250,9 @@ class Scene:
         if not prim.HasAPI(UsdLux.LightAPI):
             return None
         light = lights.Light(prim, self._stage)
+        cone = light.cone()
+        if cone is not None and (cone[0] < math.pi / 2 or cone[1] > 0):
+            light.add_loss("the cone of a mesh light is not carried: it shines in all directions")
         at = faces.points[faces.corners[triangles]]
         matrix = numpy.array(UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(self._stage.time))[:3, :3]
         across = numpy.cross((at[:, 1] - at[:, 0]) @ matrix, (at[:, 2] - at[:, 0]) @ matrix)
@@ -241,11 +265,11 @@ class Scene:
             arrays.append(normals)
         for at, name in enumerate(material.sets):
             found = meshes.primvar(prim, name, stage)
-            if found is None:
+            if found is None or found[0].shape[1] < 2:
                 stage.losses.add(prim.GetPath(), f"it has no primvar {name} for the textures of its material: they "
                                   "are one colour on it")
                 found = numpy.zeros((1, 2)), UsdGeom.Tokens.constant
-            values = faces.expand(*found, name)[:, :2] * (1, -1) + (0, 1)
+            values = meshes.expanded(found, name, faces, stage, (0.0, 0.0))[:, :2] * (1, -1) + (0, 1)
             names.append(f"TEXCOORD_{at}")
             arrays.append(values)
         if material.color:
@@ -258,9 +282,9 @@ class Scene:
 
 
 def _check_matrix(where, matrix, hint):
-    """Raise a Fault if a transform overflows single precision, which glTF cannot store."""
+    """Raise an Invalid if a transform overflows single precision, which glTF cannot store."""
     if not (numpy.abs(numpy.array(matrix)) <= numpy.finfo(numpy.float32).max).all():
-        raise Fault(where, "its transform is not finite", hint)
+        raise Invalid(where, "its transform is not finite", hint)
 
 
 def _named(name, made):

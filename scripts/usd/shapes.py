@@ -5,7 +5,6 @@ import math
 import numpy
 from pxr import UsdGeom
 
-from faults import Fault
 from meshes import Faces
 
 _SIDES, _RINGS = 64, 32
@@ -59,7 +58,8 @@ def of_prim(prim, stage, size=1.0):
 def _axis(prim, stage):
     axis = stage.get(prim.GetAttribute("axis"), "Z")
     if axis not in ("X", "Y", "Z"):
-        raise Fault(prim.GetPath(), f"its axis is {axis}", "it is X, Y or Z")
+        stage.losses.add(prim.GetPath(), f"its axis is {axis}, which is none of X, Y and Z: it is taken as Z")
+        return "Z"
     return axis
 
 

@@ -6,10 +6,11 @@ import re
 
 from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdSkel
 
-from faults import Fault, Losses, text_of
+from faults import Fault, Invalid, Losses, check_pointer, text_of
 
 # Limits of metersPerUnit within which squared lengths neither underflow nor overflow.
 _MIN_METRES, _MAX_METRES = 1e-30, 1e30
+_DEFAULT_METRES = 0.01  # USD's
 # Deepest nesting of `caustique:*` keys.
 _MAX_DEPTH = 64
 
@@ -28,6 +29,7 @@ class Stage:
         self.path = os.path.abspath(path)
         self.losses = Losses()
         self._folder = None if allow_outside else os.path.realpath(os.path.dirname(self.path))
+        _check_pointer_file(self.path, "")
         try:
             self.stage = Usd.Stage.Open(self.path)
         except Tf.ErrorException as error:
@@ -36,6 +38,9 @@ class Stage:
             if layer.realPath:
                 self.check_path(layer.realPath, "the stage")
         for error in self.stage.GetCompositionErrors():
+            layer = re.search("@([^@]+)@", text_of(error))
+            if layer and self._allows(layer[1]):
+                _check_pointer_file(layer[1], layer[1])
             self.losses.add(getattr(error, "rootSite", None) and error.rootSite.path or "stage",
                              f"composition: {text_of(error)}")
         self.has_frame = frame is not None
@@ -44,7 +49,9 @@ class Stage:
         said = self.stage.HasAuthoredMetadata("metersPerUnit") and self.stage.GetMetadata("metersPerUnit")
         self.metres = said if isinstance(said, float) else UsdGeom.GetStageMetersPerUnit(self.stage)
         if not _MIN_METRES <= self.metres <= _MAX_METRES:
-            raise Fault("/", f"metersPerUnit is {self.metres}", "it has to be a number above zero")
+            self.losses.add("/", f"metersPerUnit is {self.metres}, which is no number above zero: it is taken as "
+                             f"{_DEFAULT_METRES}")
+            self.metres = _DEFAULT_METRES
         self.by_blender = (self.stage.GetRootLayer().documentation or "").startswith("Blender v4.")
         axis = UsdGeom.GetStageUpAxis(self.stage)
         if axis not in (UsdGeom.Tokens.y, UsdGeom.Tokens.z):
@@ -59,12 +66,17 @@ class Stage:
                    for attribute in prim.GetAuthoredAttributes())
 
     def _time_code(self, frame):
-        if frame is None and not self.stage.HasAuthoredTimeCodeRange():
+        if frame is not None:
+            if not math.isfinite(frame):
+                raise Fault("/", f"its frame is {frame}", "give it a number")
+            return Usd.TimeCode(frame)
+        if not self.stage.HasAuthoredTimeCodeRange():
             return Usd.TimeCode.EarliestTime()
-        moment = self.stage.GetStartTimeCode() if frame is None else frame
-        if not math.isfinite(moment):
-            raise Fault("/", f"its {'startTimeCode' if frame is None else 'frame'} is {moment}", "give it a number")
-        return Usd.TimeCode(moment)
+        start = self.stage.GetStartTimeCode()
+        if not math.isfinite(start):
+            self.losses.add("/", f"its startTimeCode is {start}: the first sample of each attribute is taken")
+            return Usd.TimeCode.EarliestTime()
+        return Usd.TimeCode(start)
 
     def _axes(self):
         """The matrix from the stage's axes to right-handed axes with y up, for row vectors."""
@@ -92,9 +104,13 @@ class Stage:
             elif not UsdSkel.BakeSkinning(UsdSkel.Root(prim), Gf.Interval(moment, moment)):
                 self.losses.add(prim.GetPath(), "its skeleton could not be evaluated: it stands as it is bound")
 
+    def _allows(self, path):
+        """Whether the stage may name the file at `path`."""
+        return self._folder is None or os.path.commonpath([self._folder, os.path.realpath(path)]) == self._folder
+
     def check_path(self, path, what):
         """Raise a Fault if a file is outside the stage's folder and this is not allowed."""
-        if self._folder is None or os.path.commonpath([self._folder, os.path.realpath(path)]) == self._folder:
+        if self._allows(path):
             return
         raise Fault(what, f"the file {path} is outside the scene's folder",
                     "put it beside the scene file and name it so, or allow such files with --allow-outside")
@@ -104,41 +120,48 @@ class Stage:
         name = value.resolvedPath or value.path
         where = prim.GetPath()
         if not value.path:
-            raise Fault(where, "it names no file", "give the texture's path in inputs:file")
+            raise Invalid(where, "it names no file", "give the texture's path in inputs:file")
         if "\0" in name:
-            raise Fault(where, f"no file has a name as {value.path!r}", "give the texture's path in inputs:file")
+            raise Invalid(where, f"no file has a name as {value.path!r}", "give the texture's path in inputs:file")
         if not value.resolvedPath:
             # Do not reveal whether a file outside the folder exists.
             self.check_path(os.path.join(os.path.dirname(self.path), value.path), where)
-            raise Fault(where, f"the file {value.path} is not found", "put it where the stage looks for it")
+            raise Invalid(where, f"the file {value.path} is not found", "put it where the stage looks for it")
         self.check_path(Ar.SplitPackageRelativePathOuter(name)[0], where)
         opened = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(name))
         if opened is None:
-            raise Fault(where, f"the file {value.path} cannot be read", "check your right to read it")
+            raise Invalid(where, f"the file {value.path} cannot be read", "check your right to read it")
         with opened:
             buffer = opened.GetBuffer()
         if buffer is None:
-            raise Fault(where, f"the file {value.path} is empty", "write it again")
+            raise Invalid(where, f"the file {value.path} is empty", "write it again")
         data = bytes(buffer)
+        check_pointer(data, f"{where}: {value.path}")
         return data, Ar.SplitPackageRelativePathInner(name)[1] or name
 
     def get(self, attribute, default=None):
-        """The value of an attribute at the time code, or `default`.
-
-        Raises a Fault if the value is not of the schema's type, or not finite.
-        """
+        """The value of an attribute at the time code, or `default`, with a loss if the value is not of the schema's type,
+        or not finite."""
         value = attribute.Get(self.time) if attribute else None
         if value is None:
             return default
         # USD returns the file's value even if its type differs from the schema's.
         type_ = attribute.GetTypeName()
         if isinstance(value, Sdf.UnregisteredValue) or kind_of(value) != kind_of(type_.defaultValue):
-            raise Fault(attribute.GetPrim().GetPath(), f"{attribute.GetName()} is a {_named(value)}, not a {type_}",
-                        "give it a value of that type")
-        if not finite(value):
-            raise Fault(attribute.GetPrim().GetPath(), f"{attribute.GetName()} is {value}, which is not finite",
-                        "give it numbers")
-        return value
+            what = f"a {_named(value)}, not a {type_}"
+        elif not finite(value):
+            what = f"{value}, which is not finite"
+        else:
+            return value
+        self.losses.add(attribute.GetPrim().GetPath(), f"{attribute.GetName()} is {what}: it is ignored")
+        return default
+
+
+def _check_pointer_file(path, where):
+    """Raise a Fault if the file at `path` is a pointer of Git LFS."""
+    if os.path.isfile(path):
+        with open(path, "rb") as file:
+            check_pointer(file.read(64), where)
 
 
 def kind_of(value):

@@ -24,6 +24,11 @@ class Surface:
     coat_roughness: object = 0.0
     coat_color: object = (1.0, 1.0, 1.0)
     coat_ior: object = 1.5
+    # Share of the diffuse light that enters, the colour it leaves with, mean free paths (stage units) and anisotropy.
+    subsurface: float = 0.0
+    subsurface_color: object = (0.8, 0.8, 0.8)
+    subsurface_radius: tuple = (1.0, 1.0, 1.0)
+    subsurface_g: float = 0.0
     sheen: tuple = (0.0, 0.0, 0.0)
     sheen_roughness: float = 0.3
     sheen_model: str = "charlie"
@@ -38,3 +43,9 @@ class Surface:
     scatter_g: float = 0.0
     dispersion: float = 0.0
     thin: object = None
+    sheet: float = 0.0  # share of the diffuse light that passes, which `Materials` sets
+
+    @property
+    def has_inside(self):
+        """Whether light enters closed meshes."""
+        return self.transmission != 0 or (self.subsurface != 0 and not self.thin)

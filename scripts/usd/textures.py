@@ -1,5 +1,6 @@
 """Adds textures to the document: files unchanged if glTF can use them, otherwise baked images."""
 
+import contextlib
 import dataclasses
 import io
 import math
@@ -10,7 +11,7 @@ import numpy
 import OpenEXR
 from PIL import Image, UnidentifiedImageError
 
-from faults import Fault
+from faults import Invalid
 
 _MIMES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 # Formats of Pillow that run no other program, as EPS does.
@@ -24,6 +25,15 @@ class Textures:
     def __init__(self, stage, document):
         self._stage, self._document = stage, document
         self._data, self._texels = {}, {}
+
+    def check(self, prim, asset):
+        """Whether the file of a texture is an image. If not, there is a loss, and the texture has its fallback."""
+        try:
+            _check_format(*self._bytes(prim, asset), prim.GetPath())
+            return True
+        except Invalid as invalid:
+            self._stage.losses.add(invalid.where, f"{invalid.fault}: it has its fallback ({invalid.hint})")
+            return False
 
     def reference(self, texture, sets, image):
         """The textureInfo of an image. `sets`: the mesh's primvars of texture coordinates, extended if necessary."""
@@ -57,6 +67,17 @@ class Textures:
             values = _colors(values) * scale + bias
         self._clip(texture, values)
         return self._png(_to_srgb(values), name), [1.0] * 3
+
+    def tint(self, texture, function, power):
+        """Index of an image of `function` of a texture's colours, relative to the largest of each channel, raised to
+        `power`, and these largest values (3 numbers)."""
+        values = self._linear(self._load(texture), self._is_srgb(texture))
+        values = (_colors(values) * texture.scale[:3] + texture.bias[:3] if texture.channel == "rgb" else
+                  numpy.repeat(self._channel(texture, values), 3, axis=2))
+        self._clip(texture, values)
+        values = function(numpy.clip(values, 0, 1))
+        most = numpy.maximum(values.reshape(-1, 3).max(0), 1e-3)
+        return self._png(_to_srgb((values / most) ** power), self._file(texture)[1]), [float(x) for x in most]
 
     def emission(self, texture):
         """Index of an sRGB image as in `color`, and the radiance (3 numbers) that multiplies it."""
@@ -146,11 +167,15 @@ class Textures:
             self._stage.losses.add(texture.prim.GetPath(), "texels outside 0 to 1 are clipped")
 
     def _file(self, texture):
-        path = texture.asset.resolvedPath or texture.asset.path
+        return self._bytes(texture.prim, texture.asset)
+
+    def _bytes(self, prim, asset):
+        """The bytes and the name of the file of an image."""
+        path = asset.resolvedPath or asset.path
         if path not in self._data:
-            if "<UDIM>" in texture.asset.path:
-                raise Fault(texture.prim.GetPath(), "UDIM tiles are not read", "bake the tiles into one image")
-            self._data[path] = self._stage.asset(texture.prim, texture.asset)
+            if "<UDIM>" in asset.path:
+                raise Invalid(prim.GetPath(), "UDIM tiles are not read", "bake the tiles into one image")
+            self._data[path] = self._stage.asset(prim, asset)
         return self._data[path]
 
     def _load(self, texture):
@@ -210,26 +235,44 @@ def _scaled(texels, bits):
     return (texels[:, :, None] if texels.ndim == 2 else texels), bits
 
 
+def _check_format(data, name, where):
+    """Raise an Invalid if the bytes `data` of a file do not start as an image."""
+    if not _is_exr(data):
+        with _reported(name, where), Image.open(io.BytesIO(data), formats=_FORMATS):
+            pass
+
+
+def _is_exr(data):
+    return data[:4] == b"\x76\x2f\x31\x01"
+
+
+@contextlib.contextmanager
+def _reported(name, where):
+    """Report errors of Pillow as Invalid."""
+    try:
+        yield
+    except MemoryError:
+        raise
+    except UnidentifiedImageError:
+        raise Invalid(where, f"the image {os.path.basename(name)} cannot be read: it is none of {', '.join(_FORMATS)}",
+                    "save it as PNG, JPEG or OpenEXR")
+    except Exception as error:  # Pillow raises many kinds of errors about invalid files
+        raise Invalid(where, f"the image {os.path.basename(name)} cannot be read: {error}",
+                    "save it as PNG, JPEG or OpenEXR")
+
+
 def _decode(data, name, where):
     """Texels of the image file with the bytes `data`, as stored, without colour conversion."""
-    if data[:4] == b"\x76\x2f\x31\x01":
+    if _is_exr(data):
         return _read_exr(data, where), 32
-    try:
+    with _reported(name, where):
         image = Image.open(io.BytesIO(data), formats=_FORMATS)
         if image.mode in ("P", "CMYK", "YCbCr", "1"):
             image = image.convert("RGBA" if "transparency" in image.info else "RGB")
         texels = numpy.asarray(image)
-    except MemoryError:
-        raise
-    except UnidentifiedImageError:
-        raise Fault(where, f"the image {os.path.basename(name)} cannot be read: it is none of {', '.join(_FORMATS)}",
-                    "save it as PNG, JPEG or OpenEXR")
-    except Exception as error:  # Pillow raises many kinds of errors about invalid files
-        raise Fault(where, f"the image {os.path.basename(name)} cannot be read: {error}",
-                    "save it as PNG, JPEG or OpenEXR")
     bits = 8 if texels.dtype == numpy.uint8 else 16
     if texels.dtype.kind not in "ui" and texels.dtype != numpy.float32:
-        raise Fault(where, f"the image {os.path.basename(name)} has texels of {texels.dtype}", "save it with 8 bits")
+        raise Invalid(where, f"the image {os.path.basename(name)} has texels of {texels.dtype}", "save it with 8 bits")
     return texels, bits
 
 
@@ -240,11 +283,11 @@ def _read_exr(data, where):
         try:
             channels = OpenEXR.File(file.name).channels()
         except Exception as error:  # OpenEXR raises many kinds of errors about invalid files
-            raise Fault(where, f"the OpenEXR image cannot be read: {error}", "write it again")
+            raise Invalid(where, f"the OpenEXR image cannot be read: {error}", "write it again")
         for name in ("RGBA", "RGB", "Y"):
             if name in channels:
                 return channels[name].pixels
-    raise Fault(where, "the OpenEXR image has neither RGB nor Y", "write it with channels R, G and B")
+    raise Invalid(where, "the OpenEXR image has neither RGB nor Y", "write it with channels R, G and B")
 
 
 def from_srgb(values):

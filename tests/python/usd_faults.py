@@ -1,4 +1,4 @@
-"""Tests invalid stages: each ends with a `Fault` or a loss that names the prim, and with no other exception."""
+"""Tests invalid stages: each has a loss that names the prim, or a `Fault` if a renderer of OpenUSD would refuse it."""
 
 import contextlib
 import io
@@ -60,7 +60,8 @@ class Faults(usd_support.Stages):
         """The text of the Fault or of the losses of a stage with this text."""
         # A new name, because USD caches files that it has read.
         self.path = self.dir / f"{next(self.names)}.usda"
-        self.path.write_bytes(b"#usda 1.0\n" + (text if isinstance(text, bytes) else text.encode()))
+        text = text if isinstance(text, bytes) else text.encode()
+        self.path.write_bytes(text if text.startswith(b"version") else b"#usda 1.0\n" + text)
         try:
             lost = convert.write(str(self.path), str(self.dir / "out.glb"), frame)
             convert.arguments(str(self.path))
@@ -103,8 +104,9 @@ class Faults(usd_support.Stages):
         self.assertIn("its frame is nan", self.outcome("", float("nan")))
 
     def test_unknown_tokens(self):
+        self.image("L")
         self.check(
-            (prim("Cone", 'uniform token axis = "W"'), "/P: its axis is W (it is X, Y or Z)"),
+            (prim("Cone", 'uniform token axis = "W"'), "/P: its axis is W, which is none of X, Y and Z"),
             (prim("Plane", 'uniform token axis = ""'), "/P: its axis is "),
             (MESH % 'color3f[] primvars:displayColor = [(1, 0, 0)] ( interpolation = "most" )',
              "/Mesh: displayColor has an interpolation most"),
@@ -118,6 +120,29 @@ class Faults(usd_support.Stages):
         text = textured(BASE.format("rgb"), 'asset inputs:file = @e.png@\ntoken inputs:sourceColorSpace = "raw"',
                         "float3 outputs:rgb")
         self.assertIn("the image e.png cannot be read: it is none of PNG, JPEG", self.outcome(text))
+
+    def test_messages_are_short(self):
+        """Whatever the length of a line that cannot be parsed, of the name of a prim, or of a value."""
+        long = 2_000_000 * "x"
+        for text in (f'def "{long}', f"def Mesh {long}", prim("Cone", f'uniform token axis = "{long}"'),
+                     f'def Sphere "{long}" {{\nfloat radius = nan\n}}', f"(\nmetersPerUnit = {long}\n)"):
+            self.assertLess(len(self.outcome(text)), 2000)
+
+    def test_pointers_of_git_lfs(self):
+        """The stage, a layer, an image and a profile."""
+        pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:%s\nsize 12345\n" % (64 * b"0")
+        for name in ("a.usdc", "a.png", "a.exr", "a.ies"):
+            (self.dir / name).write_bytes(pointer)
+        said = "the file is a pointer of Git LFS, not the file that it stands for (run 'git lfs pull' in its folder)"
+        self.check(
+            (pointer, said),
+            ('(\nsubLayers = [@a.usdc@]\n)', said),
+            ('def "A" (\nreferences = @a.usdc@\n) {}', said),
+            (textured(BASE.format("rgb"), "asset inputs:file = @a.png@"), said),
+            (prim("DomeLight", "asset inputs:texture:file = @a.exr@"), said),
+            ('def SphereLight "L" ( prepend apiSchemas = ["ShapingAPI"] ) {\nasset inputs:shaping:ies:file = @a.ies@\n}',
+             said),
+        )
 
     def test_an_unknown_up_axis(self):
         self.assertEqual(self.outcome('(\nupAxis = "X"\n)'),

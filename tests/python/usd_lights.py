@@ -168,6 +168,16 @@ class Irradiance(usd_support.Stages):
         self.assertTrue(light)
         self.check(2 / 0.4 * self.rectangle(0.5, 0.2, HEIGHT))
 
+    def test_a_profile_and_a_cone_of_a_mesh_light_are_losses(self):
+        quad = self.mesh("/Lamp", [(0, 2, 0), (1, 2, 0), (1, 2, 1)], [3], [0, 1, 2])
+        UsdLux.MeshLightAPI.Apply(quad.GetPrim())
+        shaping = UsdLux.ShapingAPI.Apply(quad.GetPrim())
+        shaping.CreateShapingIesFileAttr(Sdf.AssetPath("lamp.ies"))
+        shaping.CreateShapingConeAngleAttr(30.0)
+        self.assertEqual(self.convert()[2], [
+            "/Lamp: its IES profile lamp.ies is not carried: it shines alike in all directions",
+            "/Lamp: the cone of a mesh light is not carried: it shines in all directions"])
+
     def test_hard_cone(self):
         for at, inside in ((0.2, True), (1.9, False)):
             matrix = down() * Gf.Matrix4d().SetTranslate((at, HEIGHT, 0))
@@ -179,6 +189,31 @@ class Irradiance(usd_support.Stages):
                 self.check(8 / 4 / square * HEIGHT / math.sqrt(square))
             else:
                 self.assertEqual(self.measured()[0].max(), 0)
+
+
+class Environment(usd_support.Stages):
+    def check(self, expected, kind=None, **inputs):
+        """Compare the environment of a stage with a floor and at most one light."""
+        self.stage.RemovePrim("/Light")
+        if kind:
+            self.light(kind, **inputs)
+        document, _, _ = self.convert()
+        self.assertEqual(document["scenes"][0]["extras"]["caustique"].get("environment"), expected)
+
+    def test_a_stage_says_that_it_is_dark_only_if_it_has_a_light(self):
+        """Without one, the program adds its studio, as to glTF files."""
+        black = {"color": [0.0] * 3}
+        self.floor()
+        self.check(None)
+        self.check(black, "SphereLight", intensity=2.0)
+        self.check(black, "SphereLight", intensity=0.0)
+        self.check(black, "DomeLight", intensity=0.0)
+        self.check({"color": [2.0] * 3}, "DomeLight", intensity=2.0)
+        UsdGeom.Imageable(self.light("SphereLight")).MakeInvisible()
+        self.assertEqual(self.convert()[0]["scenes"][0]["extras"]["caustique"]["environment"], black)
+        self.stage.RemovePrim("/Light")
+        UsdLux.MeshLightAPI.Apply(self.stage.GetPrimAtPath("/Floor"))
+        self.check(black)
 
 
 def _seen(place, normal, element):

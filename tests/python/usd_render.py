@@ -11,7 +11,7 @@ import unittest
 from pathlib import Path
 
 import numpy
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdRender, UsdUtils, UsdValidation
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdRender, UsdUtils, UsdValidation
 
 import support
 import usd_support
@@ -305,12 +305,12 @@ def RenderVar "Var" {
         self.assertIn("--strict", done.stderr)
 
     def test_faults_are_errors_that_name_the_prim(self):
-        self.mesh("/World/Broken", [(0, 0, 0)], [3], [0, 0, 1])
+        UsdLux.DomeLight.Get(self.stage, "/Light").CreateTextureFileAttr("../sky.exr")
         self.save()
         for command in (("render", "-o", self.out, *QUICK), ("info",), ("plan",)):
             done = self.run_on(*command, check=1)
-            self.assertIn("stage.usda: /World/Broken: faceVertexIndices names a point beyond", done.stderr)
-            self.assertIn("hint: export the mesh again", done.stderr)
+            self.assertIn("stage.usda: /Light: the file ", done.stderr)
+            self.assertIn("is outside the scene's folder\nhint: put it beside the scene file", done.stderr)
             self.assertNotIn("Traceback", done.stderr)
         self.path.write_text("#usda 1.0\ndef Mesh {")
         done = self.run_on("info", check=1)
