@@ -123,6 +123,16 @@ impl Grid {
         let Some(columns) = &self.columns[row] else { return 0.0 };
         self.rows.pdf(row) * columns.pdf(column) / (self.extent(0, row) * self.extent(1, column))
     }
+
+    /// Density at a point that rounding may have moved out of the grid, where a hard edge still has light.
+    #[inline]
+    fn density_near(&self, at: Vec2) -> f32 {
+        const TOLERANCE: f32 = 8.0 * f32::EPSILON * PI;
+        let [rows, columns] = &self.edges;
+        let inside =
+            at.clamp(Vec2::new(rows[0], columns[0]), Vec2::new(rows[rows.len() - 1], columns[columns.len() - 1]));
+        if (at - inside).abs().max_element() > TOLERANCE { 0.0 } else { self.density(inside) }
+    }
 }
 
 /// Ascending edges from `start` to `end` with all `knots` between them, at most `step` apart.
@@ -150,6 +160,9 @@ impl Distribution {
     }
 
     fn of_profile(pattern: &Arc<Pattern>, profile: &Profile, cone: Option<SpotCone>) -> Option<Distribution> {
+        if profile.has_own_pole() {
+            return Self::about_pole(pattern, profile, cone);
+        }
         let [first, last] = profile.lit();
         let last = cone.map_or(last, |cone| last.min(polar_angle(cone.outer)));
         if first >= last {
@@ -172,6 +185,46 @@ impl Distribution {
             Value { intensity, falloff: falloff(cone, at.x), solid_angle: TAU }
         };
         Distribution::from_cells(pattern, cone, reach, [rows, columns], 1, value)
+    }
+
+    /// The distribution of a profile whose pole is across the axis of the light. The coordinates are the angles about that
+    /// pole; the axis is at azimuth 0 of the equator.
+    fn about_pole(pattern: &Arc<Pattern>, profile: &Profile, cone: Option<SpotCone>) -> Option<Distribution> {
+        let (mut polar, azimuth) = (profile.lit(), profile.azimuth());
+        let mut turns = [azimuth[0], azimuth[azimuth.len() - 1]];
+        // The part of the angles that is within the cone.
+        if let Some(outer) = cone.map(|cone| polar_angle(cone.outer)).filter(|&outer| outer < FRAC_PI_2) {
+            polar = [polar[0].max(FRAC_PI_2 - outer), polar[1].min(FRAC_PI_2 + outer)];
+            turns = [turns[0].max(-outer / TAU), turns[1].min(outer / TAU)];
+        }
+        if polar[0] >= polar[1] || turns[0] >= turns[1] {
+            return None;
+        }
+        let step = |[start, end]: [f32; 2], most: f32| most.min((end - start) / MIN_ROWS);
+        // The axis is at the corner of a cell, so that the falloff of the cone decreases away from it in each cell.
+        let knots = profile.polar().iter().copied().chain([FRAC_PI_2]);
+        let mut rows = edges(polar[0], polar[1], step(polar, MAX_POLAR_STEP), knots);
+        rows.iter_mut().for_each(|angle| *angle = one_minus_cos_of(*angle));
+        rows.dedup();
+        let knots = azimuth.iter().copied().chain([-0.25, 0.0, 0.25]);
+        let columns = edges(turns[0], turns[1], step(turns, MAX_AZIMUTH_STEP), knots);
+        let height = |at: Vec2| Self::height(profile.from_pole(Self::around_pole(at)));
+        let corners = rows.iter().flat_map(|&row| columns.iter().map(move |&column| Vec2::new(row, column)));
+        let widest = corners.map(height).fold(0.0, f32::max) + 4.0 * f32::EPSILON;
+        let reach = cone.map_or(widest, |cone| widest.min(cone.outer)).min(2.0);
+        let value = |at: Vec2| {
+            let intensity = Rgb::splat(profile.at(polar_angle(at.x), at.y));
+            Value { intensity, falloff: falloff(cone, height(at)), solid_angle: TAU }
+        };
+        Distribution::from_cells(pattern, cone, reach, [rows, columns], 1, value)
+    }
+
+    /// The unit direction, in the frame of the pole, with these coordinates: 1 minus the cosine of the angle to the pole, and
+    /// the azimuth (turns).
+    #[inline]
+    fn around_pole(at: Vec2) -> Vec3 {
+        let sin = (at.x * (2.0 - at.x)).max(0.0).sqrt();
+        warp::around_z(sin, 1.0 - at.x, at.y)
     }
 
     fn of_picture(pattern: &Arc<Pattern>, picture: &Picture, cone: Option<SpotCone>) -> Option<Distribution> {
@@ -282,7 +335,10 @@ impl Distribution {
             return Rgb::ZERO;
         }
         match &*self.pattern {
-            Pattern::Profile(profile) => Rgb::splat(profile.at(polar_angle(height), profile.turns(d)) * falloff),
+            Pattern::Profile(profile) => {
+                let d = profile.to_pole(d);
+                Rgb::splat(profile.at(polar_angle(Self::height(d)), profile.turns(d)) * falloff)
+            }
             Pattern::Picture(picture) => picture.coordinates(d).map_or(Rgb::ZERO, |at| picture.at(at) * falloff),
         }
     }
@@ -291,6 +347,10 @@ impl Distribution {
     #[inline]
     pub fn pdf_w(&self, d: Vec3) -> f32 {
         match &*self.pattern {
+            Pattern::Profile(profile) if profile.has_own_pole() => {
+                let d = profile.to_pole(d);
+                self.grid.density_near(Vec2::new(Self::height(d), profile.turns(d))) / TAU
+            }
             Pattern::Profile(profile) => self.grid.density(Vec2::new(Self::height(d), profile.turns(d))) / TAU,
             Pattern::Picture(picture) => {
                 picture.coordinates(d).map_or(0.0, |at| self.grid.density(at) / picture.solid_angle(at))
@@ -304,10 +364,7 @@ impl Distribution {
     pub fn sample(&self, u: Vec2) -> Option<(Vec3, f32)> {
         let (at, density) = self.grid.sample(u)?;
         match &*self.pattern {
-            Pattern::Profile(_) => {
-                let sin = (at.x * (2.0 - at.x)).max(0.0).sqrt();
-                Some((warp::around_z(sin, 1.0 - at.x, at.y), density / TAU))
-            }
+            Pattern::Profile(profile) => Some((profile.from_pole(Self::around_pole(at)), density / TAU)),
             Pattern::Picture(picture) => Some((picture.direction(at), density / picture.solid_angle(at))),
         }
     }
@@ -322,6 +379,7 @@ fn falloff(cone: Option<SpotCone>, height: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Mat3;
     use crate::random::{Domain, Purpose, Stream};
 
     /// A random profile, with dark directions, of either symmetry.
@@ -344,6 +402,26 @@ mod tests {
         Profile::new(polar, azimuth, values).expect("a profile")
     }
 
+    /// A random profile about a pole across the axis of the light, with hard edges.
+    fn profile_about_pole(seed: u64) -> Profile {
+        let draw = |k: u64| Stream::new(35, k, Domain::Test, seed).vertex(0).one(Purpose::Lobe);
+        let range = |k: u64, n: usize, least: f32, most: f32| -> Vec<f32> {
+            let half = least + (most - least) * draw(k);
+            (0..n).map(|i| half * (2.0 * i as f32 / (n - 1) as f32 - 1.0 + 0.1 * draw(k + 1))).collect()
+        };
+        let (rows, columns) = (2 + (seed % 4) as usize, 2 + (seed % 3) as usize);
+        let polar = range(0, rows, 0.002, 1.4).iter().map(|angle| FRAC_PI_2 + angle).collect();
+        let azimuth = range(10, columns, 0.0003, 0.45);
+        let value = |k: usize| if draw(k as u64 + 20) < 0.3 { 0.0 } else { draw(k as u64 + 50) };
+        let mut values: Vec<f32> = (0..rows * columns).map(value).collect();
+        values[rows * columns / 2] = 1.0;
+        let (sin, cos) = (TAU * draw(99)).sin_cos();
+        let pole = Vec3::new(cos, sin, 0.0);
+        let mirrored = if seed.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let to_pole = Mat3::from_cols(Vec3::Z, pole.cross(Vec3::Z) * mirrored, pole).transpose();
+        Profile::about_pole(to_pole, polar, azimuth, values).expect("a profile")
+    }
+
     /// A random picture with black texels.
     fn picture(seed: u64) -> Picture {
         let (width, height) = ([3, 40, 700][(seed % 3) as usize], [1, 50, 20][(seed / 3 % 3) as usize]);
@@ -359,7 +437,11 @@ mod tests {
     }
 
     fn pattern(seed: u64) -> Arc<Pattern> {
-        Arc::new(if seed < 24 { Pattern::Profile(profile(seed)) } else { Pattern::Picture(picture(seed)) })
+        Arc::new(match seed {
+            0..24 => Pattern::Profile(profile(seed)),
+            24..48 => Pattern::Picture(picture(seed)),
+            _ => Pattern::Profile(profile_about_pole(seed)),
+        })
     }
 
     fn cone(seed: u64) -> Option<SpotCone> {
@@ -371,7 +453,7 @@ mod tests {
     /// direction with light has density zero.
     #[test]
     fn samples_match_their_density_and_carry_the_flux() {
-        for seed in 0..48 {
+        for seed in 0..72 {
             let Some(shape) = Distribution::new(pattern(seed), cone(seed)) else {
                 // A narrow cone may see black texels alone.
                 assert!(seed >= 24 && seed % 3 == 0, "{seed}");

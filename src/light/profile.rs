@@ -1,15 +1,18 @@
 //! Photometric profiles: the relative intensity of a luminaire, measured at angles around it (IESNA LM-63).
 
-use crate::math::{Vec3, atan2_turns};
+use crate::math::{Mat3, Vec3, atan2_turns};
 use std::f32::consts::{FRAC_1_PI, PI};
 
-/// Relative intensity over directions around an axis, interpolated linearly in both angles. Beyond the measured polar
-/// angles it is zero.
+/// Relative intensity over directions around a pole, interpolated linearly in both angles. Beyond the measured angles it
+/// is zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
-    /// Angles to the axis (radians), ascending, from 0 to pi.
+    /// The transform from the frame of the light to one whose z axis is the pole, and whose x axis is that of the light;
+    /// `None` if the axis of the light is the pole.
+    to_pole: Option<Mat3>,
+    /// Angles to the pole (radians), ascending, from 0 to pi.
     polar: Vec<f32>,
-    /// Angles about the axis (turns), ascending; the last is the first plus 1.
+    /// Angles about the pole (turns), ascending. If the axis of the light is the pole, the last is the first plus 1.
     azimuth: Vec<f32>,
     /// Relative intensity, 0 to 1; all polar angles of the first azimuth, then of the next one.
     values: Vec<f32>,
@@ -41,7 +44,18 @@ impl Profile {
     /// A profile of `values` at every pair of a polar angle (radians) and an azimuth (turns), all polar angles of an
     /// azimuth together. The last azimuth is a turn after the first one, with equal values. `None` if no value is
     /// positive, if a value is negative or not finite, or if the angles are not ascending or of the wrong number.
-    pub fn new(polar: Vec<f32>, azimuth: Vec<f32>, mut values: Vec<f32>) -> Option<Profile> {
+    pub fn new(polar: Vec<f32>, azimuth: Vec<f32>, values: Vec<f32>) -> Option<Profile> {
+        Self::about(None, polar, azimuth, values)
+    }
+
+    /// The profile of [`Profile::new`] about a pole across the axis of the light, with azimuths from -0.5 to 0.5 turns, 0
+    /// along the axis. `to_pole` is an orthogonal transform from the frame of the light to one whose z axis is the pole and
+    /// whose x axis is that of the light.
+    pub fn about_pole(to_pole: Mat3, polar: Vec<f32>, azimuth: Vec<f32>, values: Vec<f32>) -> Option<Profile> {
+        Self::about(Some(to_pole), polar, azimuth, values)
+    }
+
+    fn about(to_pole: Option<Mat3>, polar: Vec<f32>, azimuth: Vec<f32>, mut values: Vec<f32>) -> Option<Profile> {
         let ascending = |angles: &[f32]| angles.len() > 1 && angles.windows(2).all(|pair| pair[0] < pair[1]);
         let peak = values.iter().copied().fold(0.0, f32::max);
         let valid = values.iter().all(|x| x.is_finite() && *x >= 0.0) && peak > 0.0;
@@ -50,7 +64,7 @@ impl Profile {
             return None;
         }
         values.iter_mut().for_each(|x| *x /= peak);
-        Some(Profile { polar, azimuth, values })
+        Some(Profile { to_pole, polar, azimuth, values })
     }
 
     /// Polar angles (radians) of the measurements.
@@ -58,7 +72,24 @@ impl Profile {
         &self.polar
     }
 
-    /// Azimuths (turns) of the measurements; the last is the first plus 1.
+    /// Whether the pole of the angles is across the axis of the light.
+    pub(super) fn has_own_pole(&self) -> bool {
+        self.to_pole.is_some()
+    }
+
+    /// A direction in the frame of the light, in the frame of the pole.
+    #[inline]
+    pub(super) fn to_pole(&self, d: Vec3) -> Vec3 {
+        self.to_pole.map_or(d, |to_pole| to_pole * d)
+    }
+
+    /// A direction in the frame of the pole, in the frame of the light.
+    #[inline]
+    pub(super) fn from_pole(&self, d: Vec3) -> Vec3 {
+        self.to_pole.map_or(d, |to_pole| to_pole.transpose() * d)
+    }
+
+    /// Azimuths (turns) of the measurements.
     pub(super) fn azimuth(&self) -> &[f32] {
         &self.azimuth
     }
@@ -77,7 +108,7 @@ impl Profile {
         [self.polar[first.saturating_sub(1)], self.polar[(last + 1).min(n - 1)]]
     }
 
-    /// Azimuth (turns) of a direction in the frame of the light, in the range of the measurements.
+    /// Azimuth (turns) of a direction in the frame of the pole, within a turn from the first of the measurements.
     #[inline]
     pub(super) fn turns(&self, d: Vec3) -> f32 {
         let start = self.azimuth[0];
@@ -90,7 +121,8 @@ impl Profile {
         let n = self.polar.len();
         // A measured end at a pole or at the horizon must not depend on rounding.
         let tolerance = 4.0 * f32::EPSILON * PI;
-        if polar < self.polar[0] - tolerance || polar > self.polar[n - 1] + tolerance {
+        let last = self.azimuth[self.azimuth.len() - 1];
+        if polar < self.polar[0] - tolerance || polar > self.polar[n - 1] + tolerance || azimuth > last + tolerance {
             return 0.0;
         }
         let (i, x) = interval(&self.polar, polar);
