@@ -26,7 +26,7 @@ fn with(mut description: Description, name: &str, mesh: Mesh, material: Material
 }
 
 fn ball(material: Material) -> Description {
-    with(lit(), "Ball", sphere(Vec3::new(0.0, 1.0, 0.0), 0.5, 16), material)
+    with(lit(), "Ball", sphere(Vec3::new(0.0, 1.0, 0.0), 0.5, 32), material)
 }
 
 /// The only warning about a scene.
@@ -299,7 +299,7 @@ fn alpha_in_place_of_glass() {
     // Texture alpha: nearly uniform, and a cut-out.
     let textured = |alphas: [f32; 4]| {
         let first = TextureRef { texture: 0, set: 0, transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] };
-        let mut body = sphere(Vec3::new(0.0, 1.0, 0.0), 0.5, 16);
+        let mut body = sphere(Vec3::new(0.0, 1.0, 0.0), 0.5, 32);
         body.uvs[0] = body.positions.iter().map(|p| Vec2::new(p.x + 0.5, p.z + 0.5)).collect();
         let texels = Texels::Floats(alphas.map(|alpha| [1.0, 1.0, 1.0, alpha]).to_vec());
         let (wrap, name) = ([Wrap::Repeat; 2], "alphas".into());
@@ -335,7 +335,7 @@ fn a_dome_shuts_the_environment_out() {
         description
     };
     assert_eq!(self::plan(hidden(under(matte(0.5, 0.0), 7.0))).warnings, [expected]);
-    let mut sunny = hidden(with(floor(), "Dome", sphere(Vec3::ZERO, 7.0, 16), matte(0.5, 0.0)));
+    let mut sunny = hidden(with(floor(), "Dome", sphere(Vec3::ZERO, 7.0, 32), matte(0.5, 0.0)));
     let sun = PunctualKind::Sun { angle: 0.01 };
     sunny.lights = vec![PunctualLight { kind: sun, ..point_light(DVec3::ZERO, 1.0) }];
     assert_eq!(warning(sunny), expected.replace("the environment lights", "the sun lights"));
