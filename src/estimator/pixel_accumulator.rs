@@ -79,12 +79,11 @@ pub struct PixelAccumulator {
     /// Sum over camera paths of the albedo in the G-buffer.
     albedo: DVec3,
     normal: DVec3,
-    /// Sum over camera paths of the length up to the first hit that is not on a perfect mirror or clear glass (scene
-    /// units).
+    /// Sum over camera paths of the length up to the hit of the G-buffer (scene units).
     depth: Total,
     /// Number of camera paths whose albedo, normal and depth are all finite.
     features: u32,
-    /// Number of camera paths with a hit that is not on a perfect mirror or clear glass.
+    /// Number of camera paths with a G-buffer.
     depths: u32,
     /// Counts of camera paths by the instance that they hit first.
     pub coverage: Coverage,
@@ -266,8 +265,7 @@ impl PixelAccumulator {
         self.normal.normalize_or_zero()
     }
 
-    /// Mean length (scene units) of camera paths up to the first hit that is not on a perfect mirror or clear glass;
-    /// `None` if no path has such a hit.
+    /// Mean length (scene units) of camera paths up to the hit of the G-buffer; `None` if no path has such a hit.
     pub fn depth(&self) -> Option<f64> {
         (self.depths > 0).then(|| self.depth.value() / f64::from(self.depths))
     }

@@ -313,7 +313,7 @@ pub static LAYERS: &[LayerKind] = &[
     LayerKind {
         name: "albedo",
         unit: "1",
-        meaning: "reflectance at the first hit that is not a perfect mirror or clear glass",
+        meaning: "reflectance at the first hit that scatters broadly, seen through glass and in mirrors of a roughness up to 0.45",
         finish: Some(Use::Picture),
         compositing: true,
         half: true,
@@ -346,8 +346,8 @@ pub static LAYERS: &[LayerKind] = &[
         ..LayerKind::first(
             MOTION,
             "XYZW",
-            "motion at that hit: place in the previous frame less that in this one, and place in this frame less that in \
-             the next, y up; only if asked for by name",
+            "motion at the first hit that is not a perfect mirror or clear glass: place in the previous frame less that in \
+             this one, and place in this frame less that in the next, y up; only if asked for by name",
         )
     },
     LayerKind {

@@ -9,7 +9,7 @@ METHODS = tuple(
     (name, label, definition.help_of("method", name))
     for name, label in (("auto", "Auto"), ("vcm", "VCM"), ("path", "Path"), ("bdpt", "BDPT"), ("sppm", "SPPM")))
 
-_DENOISERS = {"auto": "Auto", "oidn": "Open Image Denoise", "own": "Own", "none": "No Denoiser"}
+_DENOISERS = {"auto": "Auto", "full": "Smooth", "oidn": "Open Image Denoise", "own": "Own", "none": "No Denoiser"}
 FINISHES = (
     *((name, _DENOISERS.get(name, name), definition.help_of("denoise", name)) for name in definition.names("denoise")),
     ("off", "Off", "The estimate itself, with its noise"),

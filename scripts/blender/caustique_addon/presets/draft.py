@@ -3,6 +3,6 @@
 import bpy
 
 settings = bpy.context.scene.caustique_render
-settings.method, settings.finish = "auto", "auto"
+settings.method, settings.finish = "auto", "full"
 settings.use_iterations, settings.iterations = True, 4
 settings.use_time, settings.use_error = False, False
