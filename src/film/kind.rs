@@ -313,7 +313,7 @@ pub static LAYERS: &[LayerKind] = &[
     LayerKind {
         name: "albedo",
         unit: "1",
-        meaning: "reflectance at the first hit that scatters broadly, seen through glass and in mirrors of a roughness up to 0.45",
+        meaning: "reflectance at the first broad hit, through glass and in mirrors of a roughness up to 0.45",
         finish: Some(Use::Picture),
         compositing: true,
         half: true,
