@@ -316,12 +316,14 @@ impl Lights {
     }
 
     /// Calls `each(radiance, distance, group)` for every bulb on the ray from `origin` along the unit `d`, up to the
-    /// distance `reach`. `camera`: the ray starts at the camera.
+    /// distance `reach`. The light comes from all points of the bulb along the ray; `distance` is that of one of them,
+    /// which the uniform number `u` selects. `camera`: the ray starts at the camera.
     pub fn for_each_bulb(
         &self,
         (origin, d): (Vec3, Vec3),
         reach: f32,
         camera: bool,
+        u: f32,
         mut each: impl FnMut(Rgb, f32, Group),
     ) {
         for &index in self.bulbs.iter() {
@@ -337,7 +339,7 @@ impl Lights {
                 _ => continue,
             };
             if intensity != Rgb::ZERO
-                && let Some((share, distance)) = crossed_share(ball, origin, d, reach)
+                && let Some((share, distance)) = crossed_share(ball, origin, d, reach, u)
             {
                 each(intensity * (share / (PI * ball.1 * ball.1)), distance, self.group(index));
             }

@@ -110,6 +110,8 @@ pub enum Purpose {
     Moment = 30,
     /// Tentative collisions along a ray in a heterogeneous medium.
     Tracking = 31,
+    /// Point of a bulb on a camera path's segment.
+    Bulb = 32,
 }
 
 /// Finaliser of SplitMix64 \[Steele, Lea, Flood 2014; constants of Stafford's Mix13\]: a bijection with full avalanche.

@@ -9,6 +9,7 @@ use crate::geometry::Surface;
 use crate::light::Group;
 use crate::math::{Rgb, Vec3};
 use crate::medium::FlightDensity;
+use crate::random::{Draws, Purpose};
 use crate::scene::Scene;
 use crate::trace::{Hit, Ray};
 
@@ -71,9 +72,12 @@ pub(super) fn for_each_bulb(
     start: &Start,
     reach: f32,
     (from_medium, camera): (bool, bool),
+    draws: Draws,
     mut each: impl FnMut(Rgb, Vec3, Group),
 ) {
-    scene.lights.for_each_bulb((start.origin, start.direction), reach, camera, |radiance, distance, group| {
+    // Media attenuate the light of the bulb's points differently.
+    let u = if scene.survey.media { draws.one(Purpose::Bulb) } else { 0.5 };
+    scene.lights.for_each_bulb((start.origin, start.direction), reach, camera, u, |radiance, distance, group| {
         let between = ShadowRay { start: *start, tmax: distance, reaching: None, in_medium: [from_medium, false] };
         let light = radiance * shadow_ray(scene, &between).transmittance;
         if light != Rgb::ZERO {

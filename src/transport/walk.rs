@@ -14,7 +14,7 @@ use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3, is_lit};
 use crate::medium::FlightDensity;
-use crate::random::{Purpose, Stream};
+use crate::random::{Draws, Purpose, Stream};
 use crate::scene::Scene;
 use crate::scene::contact::ContactPoint;
 use crate::spectrum::{Wavelength, WavelengthSample};
@@ -234,7 +234,7 @@ impl<'a> Path<'a> {
             && scene.lights.has_bulbs()
             && scattered.is_none_or(|scattered| scattered.lobe == LobeSet::DELTA)
         {
-            visit_bulbs(scene, &segment, visitor);
+            visit_bulbs(scene, &segment, draws, visitor);
         }
         if BESIDES >= SCATTERING
             && let (End::Surface(_) | End::Escaped(_), Some(scattered)) = (&end, &mut self.scattered)
@@ -429,10 +429,10 @@ fn visit_pass_through_lights<'a, V: Visitor<'a>>(scene: &Scene, segment: &Segmen
 /// Shows the visitor the bulbs of lights on a segment that starts at the camera or at a delta lobe.
 #[cold]
 #[inline(never)]
-fn visit_bulbs<'a, V: Visitor<'a>>(scene: &Scene, segment: &Segment<'_>, visitor: &mut V) {
+fn visit_bulbs<'a, V: Visitor<'a>>(scene: &Scene, segment: &Segment<'_>, draws: Draws, visitor: &mut V) {
     let Segment { start, end, from_medium, throughput, depth, scattered } = *segment;
     let reach = if let End::Surface(arrival) = end { arrival.distance } else { f32::INFINITY };
-    for_each_bulb(scene, start, reach, (from_medium, depth == 1), |radiance, at, group| {
+    for_each_bulb(scene, start, reach, (from_medium, depth == 1), draws, |radiance, at, group| {
         visitor.bulb(&BulbHit { light: throughput * radiance, group, depth, at }, scattered);
     });
 }
