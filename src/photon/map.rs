@@ -49,6 +49,31 @@ impl PhotonFlags {
     }
 }
 
+/// What decides which camera paths gather a photon, in one byte: the band of the light path's wavelength, and the code
+/// (0 to 15) of the solids around that alpha lets not exist for the light path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct PhotonTag(u8);
+
+impl PhotonTag {
+    /// Packs a band and a code.
+    #[inline]
+    pub fn new(band: Band, absent: u8) -> PhotonTag {
+        PhotonTag(band.bits() << 4 | absent & 15)
+    }
+
+    /// Band of the light path's wavelength; [`Band::WHITE`] for a path without one, which has not met dispersive glass.
+    #[inline]
+    pub fn band(self) -> Band {
+        Band::from_bits(self.0 >> 4)
+    }
+
+    /// Code of the absent solids.
+    #[inline]
+    pub fn absent(self) -> u8 {
+        self.0 & 15
+    }
+}
+
 /// A photon on a surface: a vertex of a light path, reduced to the data that gathering needs, in the order in which
 /// gathering loads it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -66,8 +91,8 @@ pub struct Photon {
     pub depth: u16,
     /// Whether, and how likely, camera paths find the light of the photon on their own.
     pub flags: PhotonFlags,
-    /// Band of the light path's wavelength; 0 for a path without one, which has not met dispersive glass.
-    pub band: Band,
+    /// Band of the light path's wavelength, and the absent solids around the photon.
+    pub tag: PhotonTag,
     /// Weight and rank, for bandwidth rules that count photons; zero if light paths are not guided.
     pub thinning_key: ThinningKey,
 }
@@ -359,7 +384,7 @@ mod tests {
                     flux: Vec3::splat(i as f32),
                     flags: PhotonFlags(0),
                     depth: 2,
-                    band: Band::WHITE,
+                    tag: PhotonTag::default(),
                     thinning_key: ThinningKey::default(),
                 }
             })
@@ -401,7 +426,7 @@ mod tests {
             flux: Vec3::ONE,
             flags: PhotonFlags(0),
             depth: 2,
-            band: Band::WHITE,
+            tag: PhotonTag::default(),
             thinning_key: ThinningKey::default(),
         }]);
         let count = |radius2| {

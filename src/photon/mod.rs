@@ -10,7 +10,7 @@ mod volume;
 
 pub use kernel::Kernel;
 pub use kind::{ByKind, Kind, PhotonMaps};
-pub use map::{Located, Photon, PhotonFlags, PhotonMap};
+pub use map::{Located, Photon, PhotonFlags, PhotonMap, PhotonTag};
 pub use near::{Near, same_surface};
 pub use nearest::{MAX_NEIGHBOURS, Nearest};
 pub use thinning_key::ThinningKey;

@@ -154,9 +154,9 @@ impl<P: Located> Near<P> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::photon::PhotonTag;
     use crate::photon::{Photon, PhotonFlags, ThinningKey};
     use crate::random::{Domain, Purpose, Stream};
-    use crate::spectrum::Band;
 
     /// Clusters, coincident photons and a sheet with two normals; queries that walk, jump and change their radius.
     #[test]
@@ -178,7 +178,7 @@ mod tests {
                     flux: Vec3::splat(i as f32),
                     flags: PhotonFlags::default(),
                     depth: 2,
-                    band: Band::WHITE,
+                    tag: PhotonTag::default(),
                     thinning_key: ThinningKey::default(),
                 }
             })

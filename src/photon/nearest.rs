@@ -88,9 +88,9 @@ fn insert(best: &mut Vec<f32>, k: usize, distance2: f32, radius2: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::photon::PhotonTag;
     use crate::photon::{PhotonFlags, ThinningKey};
     use crate::random::{Domain, Purpose, Stream};
-    use crate::spectrum::Band;
 
     #[test]
     fn the_kth_nearest_agrees_with_sorting() {
@@ -106,7 +106,7 @@ mod tests {
                     flux: Vec3::ONE,
                     flags: PhotonFlags::default(),
                     depth: 2,
-                    band: Band::WHITE,
+                    tag: PhotonTag::default(),
                     thinning_key: ThinningKey::default(),
                 }
             })

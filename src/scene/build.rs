@@ -1,7 +1,7 @@
 //! Building a scene from a description: places and bakes meshes, makes lights, commits shapes to Embree.
 
 use super::description::{self, Description, EnvironmentSource, PunctualKind, PunctualLight};
-use super::nesting::Volumes;
+use super::nesting::{Volumes, alpha_solids};
 use super::{Contacts, Scene, SolidStacks, Survey, dense};
 use crate::error::Result;
 use crate::geometry::{Instance, Mesh, Placement, Shapes};
@@ -79,6 +79,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     warn_of_thin_walls(&shapes, &contacts, &mut warnings);
     let survey = Survey::new(&shapes, &materials, &lights, description.medium);
     let ranks = Volumes::of(&shapes, &materials).ranks(&shapes);
+    let alpha_solids = alpha_solids(&shapes, &materials).into();
     Ok(Scene {
         source: description.source,
         converted: description.converted,
@@ -104,6 +105,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         survey,
         contacts,
         ranks,
+        alpha_solids,
         solid_stacks: SolidStacks::default(),
         warnings,
     })
@@ -192,8 +194,7 @@ fn warn_of_cut_solids(shapes: &Shapes, materials: &Materials, warnings: &mut Vec
     }
 }
 
-/// Adds a warning for each object whose medium emits light outside of its mesh: light starts there, but cameras do not see
-/// it.
+/// Adds a warning for each object whose medium emits light outside of its mesh, where it does not exist.
 fn warn_of_fires((shapes, materials): (&Shapes, &Materials), warnings: &mut Vec<String>) {
     for instance in &shapes.instances {
         let Some(emission) = materials.list[instance.material as usize].medium_emission() else { continue };
@@ -202,7 +203,7 @@ fn warn_of_fires((shapes, materials): (&Shapes, &Materials), warnings: &mut Vec<
         let tolerance = MAX_FIRE_OUTSIDE * (to - from);
         if (from + tolerance).cmplt(low).any() || (to - tolerance).cmpgt(high).any() {
             warnings.push(format!(
-                "object \"{}\": the grid of its emission reaches out of its mesh, where cameras do not see the light \
+                "object \"{}\": the grid of its emission reaches out of its mesh, where it does not burn \
                  (make the mesh larger)",
                 instance.name
             ));
@@ -293,6 +294,7 @@ pub(super) fn rebuild_with_materials(
         survey: Survey::new(&shapes, &materials, &lights, medium),
         contacts,
         ranks: Arc::clone(&scene.ranks),
+        alpha_solids: alpha_solids(&shapes, &materials).into(),
         solid_stacks: SolidStacks::default(),
         warnings: Vec::new(),
         shapes,

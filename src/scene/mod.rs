@@ -25,7 +25,7 @@ pub use contacts::Contacts;
 pub use description::Description;
 pub use light_preset::LightPreset;
 pub use moment::MomentBuilder;
-pub use nesting::{EMPTY_STACK, SolidStack, SolidStacks};
+pub use nesting::{ABSENT, AlphaSolid, EMPTY_STACK, SolidStack, SolidStacks};
 pub use pose::{Pose, TrianglePoint};
 pub use survey::Survey;
 pub use view::View;
@@ -93,6 +93,8 @@ pub struct Scene {
     /// Rank of the solid that each instance belongs to. Where solids of equal priority overlap, the highest rank fills
     /// the space.
     pub ranks: Arc<[u32]>,
+    /// The solids of all instances, which alpha lets exist with a probability; empty if all solids exist for all paths.
+    pub alpha_solids: Arc<[AlphaSolid]>,
     /// Stacks of solids, too deep for a path to carry, that paths have entered.
     pub solid_stacks: SolidStacks,
     /// What the scene file offers to choose from, and its extensions.
@@ -139,6 +141,11 @@ impl Scene {
         let material = &self.materials.list[surface.material as usize];
         let chance = material.coverage(surface, &self.materials.textures);
         chance >= build::random_cutoff(token, surface.instance, u32::MAX)
+    }
+
+    /// Whether a path that starts in the solid bounded by `instance` finds it present, as [`Scene::solid_is_present`].
+    pub fn starts_in_solid(&self, instance: u32, token: u32) -> bool {
+        self.alpha_solids[instance as usize].chance >= build::random_cutoff(token, instance, u32::MAX - 1)
     }
 
     /// Whether a camera ray along `direction` passes through the surface, because glTF culls its back face.

@@ -3,7 +3,7 @@
 
 use super::dense::limit_densities;
 use super::description::{Description, PlacedMesh, missing_at_moments};
-use super::nesting::Volumes;
+use super::nesting::{Volumes, alpha_solids};
 use super::{Contacts, Scene, SolidStacks, Survey, build};
 use crate::error::Result;
 use crate::geometry::{Instance, Mesh, Shapes};
@@ -104,6 +104,10 @@ impl<'a> MomentBuilder<'a> {
             survey: Survey::new(&shapes, &materials, &lights, medium),
             contacts: self.contacts(&shapes, &materials, &boxes),
             ranks: self.ranks(&shapes, &materials),
+            alpha_solids: match Arc::ptr_eq(&materials, &scene.materials) {
+                true => Arc::clone(&scene.alpha_solids),
+                false => alpha_solids(&shapes, &materials).into(),
+            },
             solid_stacks: SolidStacks::default(),
             warnings: Vec::new(),
             shapes,

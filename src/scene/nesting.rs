@@ -4,13 +4,17 @@
 //! consing, Ershov 1958\], so a path carries one index for a stack of any depth. The index depends on the order of the
 //! threads, the stack does not. Few scenes have such deep stacks, so the lock does not matter.
 
-use crate::geometry::{Mesh, Shapes};
+use crate::geometry::{Instance, Mesh, Shapes};
 use crate::material::Materials;
+use crate::math::warp;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, PoisonError, RwLock};
 
 /// Index of the empty stack of solids.
 pub const EMPTY_STACK: u32 = u32::MAX;
+
+/// Bit of an instance's index in a stack of solids: alpha has decided that the solid does not exist for the path.
+pub const ABSENT: u32 = 1 << 31;
 
 /// Maximum number of stacks of solids that a scene stores. More of them come from open meshes, which paths enter and
 /// never leave.
@@ -22,10 +26,10 @@ const MAX_STACKS: usize = 1 << 20;
 pub struct SolidStack {
     /// Index of the stack of solids entered before the last one, or [`EMPTY_STACK`].
     pub outer: u32,
-    /// Index of the instance of the solid that was entered last.
+    /// Index of the instance of the solid that was entered last, with the bit [`ABSENT`] if it does not exist.
     pub last: u32,
-    /// Index of the instance of the solid that fills the space, among the solids of the stack.
-    pub host: u32,
+    /// Index of the instance of the solid that fills the space, among the solids of the stack; `None` if none exists.
+    pub host: Option<u32>,
 }
 
 /// Relative change of a solid's volume between moments that is taken for rounding, so that solids of equal size keep
@@ -97,6 +101,71 @@ fn volume(mesh: &Mesh) -> f64 {
         a.dot(b.cross(c)) / 6.0
     };
     mesh.triangles.iter().map(of).sum()
+}
+
+/// A solid that alpha lets exist for a part of the paths through it.
+#[derive(Clone, Copy, Debug)]
+pub struct AlphaSolid {
+    /// Probability that the solid exists for a path.
+    pub chance: f32,
+    /// Code of the object, 0 to 15. The exclusive or of the codes of the absent solids around a point tells, up to
+    /// collisions of codes, which of them are absent: exactly if the scene has at most four objects with such solids, or
+    /// if at most two of the first fifteen overlap.
+    pub code: u8,
+}
+
+/// Codes of the objects of [`AlphaSolid`]s, in turn.
+const CODES: [u8; 15] = [1, 2, 4, 8, 15, 3, 5, 6, 9, 10, 12, 7, 11, 13, 14];
+
+/// Number of points of a solid at which its alpha is evaluated, if it varies.
+const ALPHA_POINTS: usize = 1024;
+
+/// Smallest probability of a solid with alpha, and of its absence, if both occur. It bounds the weight of connections.
+const MIN_CHANCE: f64 = 1e-3;
+
+/// The solids of all instances, with the probability that alpha lets them exist: the mean over the object if it varies.
+/// Empty if all solids exist for all paths.
+pub fn alpha_solids(shapes: &Shapes, materials: &Materials) -> Vec<AlphaSolid> {
+    let mut objects = BTreeMap::<u32, (f64, f64)>::new();
+    for (index, instance) in shapes.instances.iter().enumerate() {
+        let material = &materials.list[instance.material as usize];
+        if !material.has_alpha_per_entry() {
+            continue;
+        }
+        let mesh = &shapes.meshes[instance.mesh as usize];
+        let varies = material.base_color_texture.is_some() || !mesh.colors.is_empty();
+        let triangles = if varies { mesh.triangles.len() } else { mesh.triangles.len().min(1) };
+        let points = if varies { (ALPHA_POINTS / triangles.max(1)).max(1) } else { 1 };
+        let (sum, area) = objects.entry(instance.object).or_default();
+        for primitive in 0..triangles as u32 {
+            let [a, b, c] = instance.corners(mesh, primitive);
+            let weight = f64::from((b - a).cross(c - a).length()) / points as f64;
+            for point in 0..points {
+                // Rotations by irrational angles cover the triangle evenly.
+                let u = [0.754_877_7, 0.569_840_3].map(|step| (0.5 + step * point as f32).fract());
+                let at = warp::triangle_uniform(u.into());
+                let Some(surface) = shapes.surface(index as u32, primitive, [at.x, at.y]) else { continue };
+                *sum += weight * f64::from(material.coverage(&surface, &materials.textures));
+                *area += weight;
+            }
+        }
+    }
+    // Paths meet both cases if alpha varies, also where rounding or too few points miss one.
+    let inside = |mean: f64| if mean > 0.0 && mean < 1.0 { mean.clamp(MIN_CHANCE, 1.0 - MIN_CHANCE) } else { mean };
+    let chance = |(sum, area): (f64, f64)| if area > 0.0 { inside(sum / area) as f32 } else { 1.0 };
+    let partial = objects.into_iter().map(|(object, of)| (object, chance(of))).filter(|(_, chance)| *chance < 1.0);
+    let codes = CODES.into_iter().cycle();
+    let solids: HashMap<u32, AlphaSolid> =
+        partial.zip(codes).map(|((object, chance), code)| (object, AlphaSolid { chance, code })).collect();
+    if solids.is_empty() {
+        return Vec::new();
+    }
+    let certain = AlphaSolid { chance: 1.0, code: 0 };
+    let of = |instance: &Instance| {
+        let alpha = materials.list[instance.material as usize].has_alpha_per_entry();
+        solids.get(&instance.object).copied().filter(|_| alpha).unwrap_or(certain)
+    };
+    shapes.instances.iter().map(of).collect()
 }
 
 /// The deep stacks of nested solids that paths in a scene have entered so far.

@@ -103,6 +103,18 @@ impl Band {
     pub fn of_wavelength(wavelength: Option<&Wavelength>) -> Band {
         wavelength.map_or(Band::WHITE, |wavelength| wavelength.band)
     }
+
+    /// The band as a number of at most four bits.
+    #[inline]
+    pub fn bits(self) -> u8 {
+        self.0
+    }
+
+    /// The band of [`Band::bits`].
+    #[inline]
+    pub fn from_bits(bits: u8) -> Band {
+        Band(bits)
+    }
 }
 
 impl Wavelength {

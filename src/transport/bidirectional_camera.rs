@@ -4,6 +4,7 @@ use super::bidirectional::{Bidirectional, MergeLevels, PathKind, PathRecorder, T
 use super::bidirectional_light::{add, scatter};
 use super::camera_paths::CameraPaths;
 use super::cause::Cause;
+use super::interior::{Interior, Presence};
 use super::light_vertex::LightVertex;
 use super::lobe_layers::{FirstScatter, LobeHistory};
 use super::mis::{self, End, Merges, MisState, NextEventPdfs, Ratios, one_merge};
@@ -12,7 +13,7 @@ use super::path_history::PathHistory;
 use super::photon_merge::{Merge, MergePhoton};
 use super::pixel_sample::{Features, PixelSample};
 use super::scattering_vertex::ScatterPoint;
-use super::segment::{FirstHit, token, with_camera_bit};
+use super::segment::{Destination, FirstHit, token, with_camera_bit};
 use super::shares::{Connection, Incident, PathHalves, connection_shares, shares, wanted};
 use super::vertex::{MediumLight, MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::{PathStart, walk};
@@ -49,6 +50,8 @@ struct CameraWalk<'a, R> {
     last: Receiver,
     /// Number of path segments up to the last vertex.
     depth: u32,
+    /// Probability of the decisions of alpha about the solids around the end of the last segment; 1 for the first.
+    chance: f32,
     /// The first vertex, if light is recorded by its lobes.
     lobes: Option<LobeHistory>,
     sample: &'a mut PixelSample,
@@ -108,6 +111,21 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
             return false;
         }
         is_lit(light)
+    }
+
+    /// Number of samples of the technique that joins the vertex at `depth`, the last one, and the vertex before it. Where
+    /// alpha decides about the same solids for both subpaths, they join only if they agree.
+    #[inline]
+    fn joins(&self, depth: u32) -> f64 {
+        self.shared.joins(depth) * f64::from(self.chance)
+    }
+
+    /// Notes the decisions of alpha about the solids around the end of a segment.
+    #[inline]
+    fn arrive_in(&mut self, interior: &Interior, depth: u32) {
+        let scene = self.shared.camera_paths.scene;
+        // Only one subpath decides if a light vertex is connected to the camera.
+        self.chance = if depth == 1 { 1.0 } else { Presence::of(scene, interior).chance };
     }
 
     /// How the first vertex scatters light that arrives at the current one, which scatters it by `here`.
@@ -180,7 +198,7 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
                 * visibility.flight.reverse,
             delta: light.delta,
         };
-        let ratios = mis::next_event(&self.mis, self.shared.joins(vertex.depth()), &pdfs);
+        let ratios = mis::next_event(&self.mis, self.joins(vertex.depth()), &pdfs);
         let at = light.target.unwrap_or(light.wi);
         self.record.contribution(technique, value, at, ratios);
         let incident = Incident { wi: light.wi, transport: Transport::Radiance, f };
@@ -210,6 +228,8 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
         if !camera_paths.classes.is_all() && shares().is_empty() {
             return;
         }
+        let presence = light.presence(-d);
+        let connections = connections * presence.chance;
         let mut value = vertex.throughput() * f_camera * f_light * light.throughput / (distance2 * connections);
         if let (true, Some(wavelength)) = (light.dispersed, vertex.wavelength()) {
             value *= wavelength.inverse_weight();
@@ -221,7 +241,12 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
         let bits = mix(vertex.draws().bits(Purpose::SecondAlpha).wrapping_add(u64::from(light.depth)));
         let token = with_camera_bit(camera_paths.scene, bits as u32, false);
         let end = Some(light.shadow_end(-d, distance));
-        let visibility = vertex.shadow_ray_to(camera_paths.scene, d, end, token, light.in_medium(), light.touching());
+        let destination = match camera_paths.scene.alpha_solids.is_empty() {
+            true => Destination::Any,
+            false => Destination::Agreeing(presence.absent),
+        };
+        let at_end = (light.in_medium(), light.touching());
+        let visibility = vertex.shadow_ray_to(camera_paths.scene, d, end, token, at_end, destination);
         if !is_lit(visibility.transmittance) {
             return;
         }
@@ -231,21 +256,27 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
                 mis: &light.mis,
                 reverse_pdf_w: light.reverse_pdf(-d),
                 arrival_pdf_a: pdf_camera * cos_light / distance2 * visibility.flight.forward,
-                joins: self.shared.joins(light.depth),
-                merges: if light.in_medium() { Merges::ZERO } else { techniques.light_vertex_merge(light.depth) },
+                joins: self.shared.joins(light.depth) * f64::from(light.chance_before),
+                merges: if light.in_medium() {
+                    Merges::ZERO
+                } else {
+                    techniques.light_vertex_merge(light.depth) * light.merge_chance()
+                },
             },
             &End {
                 mis: &self.mis,
                 reverse_pdf_w: vertex.reverse_pdf(d, Transport::Importance),
                 arrival_pdf_a: pdf_light * cos_camera / distance2 * visibility.flight.reverse,
-                joins: self.shared.joins(vertex.depth()),
+                joins: self.joins(vertex.depth()),
                 merges: if S::IN_MEDIUM {
                     Merges::ZERO
                 } else {
-                    techniques.camera_vertex_merge(vertex.depth(), self.history.delta)
+                    let [here, behind] = vertex.interiors();
+                    let chance = Presence::at_surface(camera_paths.scene, [here, behind]).chance;
+                    techniques.camera_vertex_merge(vertex.depth(), self.history.delta) * f64::from(chance)
                 },
             },
-            f64::from(*connections),
+            f64::from(connections),
         );
         self.record.contribution(technique, value, light.p(), ratios);
         let (value, group) = (value * visibility.transmittance, light.group);
@@ -298,6 +329,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
             self.record.first_surface(vertex.shading.lobe_albedos());
         }
         self.depth = vertex.depth;
+        self.arrive_in(&vertex.interior, vertex.depth);
         let cos = vertex.wo.dot(vertex.surface.ng).abs();
         self.mis = self.mis.arrive(self.distance2(vertex.distance, scattered), cos).fly(vertex.flight);
         if let Some((radiance, density)) =
@@ -313,6 +345,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
                 self.connect_all(vertex);
             }
             if let (true, Some(photons)) = (techniques.camera_vertex_merges(vertex.depth), self.context.photons) {
+                let (presence, joins) = (vertex.presence(camera_paths.scene), self.joins(vertex.depth));
                 let sample = &mut *self.sample;
                 let add = |class: PathClass, level: usize, radiance: Rgb| {
                     *match class.part() {
@@ -327,8 +360,9 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
                     photons,
                     levels: self.context.levels,
                     mis: &self.mis,
-                    joins: self.shared.joins(vertex.depth),
-                    own: one_merge(self.history.delta),
+                    joins,
+                    absent: presence.absent,
+                    own: one_merge(self.history.delta) * f64::from(presence.chance),
                     suffix: self.history.suffix,
                     lobes: self.lobes.as_ref(),
                     classes: camera_paths.classes,
@@ -405,8 +439,9 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
 
     #[inline]
     fn scatter(&mut self, vertex: &Vertex<'_, 'a>, sample: &BsdfSample) {
-        let merges = self.shared.techniques.camera_vertex_merge(vertex.depth, self.history.delta);
-        let joins = self.shared.joins(vertex.depth);
+        let chance = f64::from(vertex.presence(self.shared.camera_paths.scene).chance);
+        let merges = self.shared.techniques.camera_vertex_merge(vertex.depth, self.history.delta) * chance;
+        let joins = self.joins(vertex.depth);
         if let Some(lobes) = &mut self.lobes {
             lobes.scatter(|| FirstScatter::of_sample(vertex, sample, LobeSet::ALL));
         }
@@ -419,6 +454,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
         let Bidirectional { camera_paths, techniques, .. } = self.shared;
         record_medium(&mut self.history, vertex, scattered, self.sample);
         self.depth = vertex.depth;
+        self.arrive_in(&vertex.arrival.interior, vertex.depth);
         self.mis = self.mis.arrive(self.distance2(vertex.arrival.distance, scattered), 1.0).fly(vertex.flight);
         if techniques.connect && vertex.depth < camera_paths.max_depth {
             self.connect_all(vertex);
@@ -437,7 +473,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
 
     #[inline]
     fn scatter_medium(&mut self, vertex: &MediumVertex, sample: &BsdfSample) {
-        let joins = self.shared.joins(vertex.depth);
+        let joins = self.joins(vertex.depth);
         if let Some(lobes) = &mut self.lobes {
             lobes.scatter(|| FirstScatter::Medium);
         }
@@ -482,6 +518,7 @@ impl Bidirectional<'_> {
             history: PathHistory::START,
             last: Receiver::anywhere(start.origin),
             depth: 0,
+            chance: 1.0,
             lobes: camera_paths.lobes.then(LobeHistory::default),
             sample,
             record,

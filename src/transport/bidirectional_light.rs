@@ -2,6 +2,7 @@
 
 use super::bidirectional::{Bidirectional, MergeLevels, PathRecorder, Technique};
 use super::cause::Cause;
+use super::interior::Presence;
 use super::light::{Emitted, LightPaths};
 use super::light_vertex::{LightVertex, Scatterer};
 use super::lobe_layers::FirstScatter;
@@ -101,6 +102,8 @@ struct LightWalk<'a, 's, R> {
     prefix: LightPrefix,
     /// Lobes of the BSDF at the last vertex; `None` in a medium.
     lobes: Option<LobeSet>,
+    /// Probability of the decisions of alpha about the solids around the start of the segment, at the last vertex.
+    chance: f32,
     photons_only: bool,
     vertices: &'a mut LightVertices<'s>,
     left: &'a mut Deposits,
@@ -119,6 +122,13 @@ impl<R: PathRecorder> LightWalk<'_, '_, R> {
             self.mis = self.mis.received(self.shared.camera_paths.scene.lights.choice_ratio(at, self.light));
         }
         self.mis = self.mis.arrive(distance2, cos).fly(flight);
+    }
+
+    /// Number of samples of the technique that joins the vertex at `depth`, the last one, and the vertex before it. Where
+    /// alpha decides about the same solids for both subpaths, they join only if they agree.
+    #[inline]
+    fn joins(&self, depth: u32) -> f64 {
+        self.shared.joins(depth) * f64::from(self.chance)
     }
 
     fn connect_camera<S: ScatterPoint>(&mut self, vertex: &S) {
@@ -157,7 +167,7 @@ impl<R: PathRecorder> LightWalk<'_, '_, R> {
         let ratios = if techniques.connect {
             let reverse = vertex.reverse_pdf(sample.wi, Transport::Radiance);
             let arrival = pdf_a * vertex.cos(sample.wi) * visibility.flight.reverse;
-            mis::camera(&self.mis, self.shared.joins(vertex.depth()), arrival, *light_paths, reverse)
+            mis::camera(&self.mis, self.joins(vertex.depth()), arrival, *light_paths, reverse)
         } else {
             Ratios::ALONE
         };
@@ -202,14 +212,15 @@ impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
             && vertex.depth < camera_paths.max_depth
         {
             let flux = vertex.throughput / *merged_paths;
-            let joins = self.shared.joins(vertex.depth);
-            self.left.photons.push(MergePhoton::new(vertex, flux, self.prefix, self.group, &self.mis, joins));
+            let (joins, presence) = (self.joins(vertex.depth), vertex.presence(camera_paths.scene));
+            self.left.photons.push(MergePhoton::new(vertex, flux, self.prefix, self.group, &self.mis, joins, presence));
         }
         let connected = self.shared.connects_light_vertex(vertex.depth);
         if connected && lobes.intersects(LobeSet::SMOOTH) && !self.photons_only && vertex.depth < camera_paths.max_depth
         {
             if self.shared.keeps_light_vertices() {
                 let arena = self.vertices.bump();
+                let sides = [&vertex.interior, &vertex.interior_behind];
                 self.vertices.push(LightVertex {
                     scatterer: Scatterer::Surface(arena.alloc(*vertex.surface), arena.alloc(*vertex.shading)),
                     wo: vertex.wo,
@@ -219,6 +230,8 @@ impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
                     prefix: self.prefix,
                     dispersed: vertex.wavelength.is_some(),
                     group: self.group,
+                    presence: sides.map(|side| Presence::of(camera_paths.scene, side)),
+                    chance_before: self.chance,
                 });
             }
             if techniques.camera
@@ -248,6 +261,8 @@ impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
                     prefix: self.prefix,
                     dispersed: vertex.wavelength.is_some(),
                     group: self.group,
+                    presence: [vertex.presence(camera_paths.scene); 2],
+                    chance_before: self.chance,
                 });
             }
             if techniques.camera && self.shared.connects_camera() {
@@ -263,16 +278,21 @@ impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
 
     #[inline]
     fn scatter_medium(&mut self, vertex: &MediumVertex, sample: &BsdfSample) {
-        let joins = self.shared.joins(vertex.depth);
+        let joins = self.joins(vertex.depth);
         self.mis = self.mis.scatter(1.0, sample.pdf_w, sample.pdf_w, joins, Merges::ZERO);
+        self.chance = vertex.presence(self.shared.camera_paths.scene).chance;
         self.record.continues(|chance| vertex.survival_chosen(LobeSet::ALL, chance));
     }
 
     #[inline]
     fn scatter(&mut self, vertex: &Vertex<'_, 's>, sample: &BsdfSample) {
-        let merges = self.shared.techniques.light_vertex_merge(vertex.depth);
-        let joins = self.shared.joins(vertex.depth);
+        let scene = self.shared.camera_paths.scene;
+        let chance = f64::from(vertex.presence(scene).chance);
+        let merges = self.shared.techniques.light_vertex_merge(vertex.depth) * chance;
+        let joins = self.joins(vertex.depth);
         self.mis = scatter(self.mis, vertex, sample, Transport::Radiance, joins, merges);
+        let side = if sample.transmitted { &vertex.interior_behind } else { &vertex.interior };
+        self.chance = Presence::of(scene, side).chance;
         self.record.continues(|chance| vertex.survival_chosen(LobeSet::ALL, chance));
     }
 }
@@ -320,6 +340,7 @@ impl<'s> Bidirectional<'s> {
             infinite: emitted.density.infinite,
             prefix: LightPrefix::start(emitted.delta),
             lobes: None,
+            chance: 1.0,
             photons_only,
             vertices,
             left,

@@ -114,7 +114,7 @@ struct SurroundingSolids {
 
 impl SurroundingSolids {
     fn is_in(&self, scene: &Scene, medium: u32) -> bool {
-        self.closed_meshes == 0 && self.interior.material(scene).unwrap_or(u32::MAX) == medium
+        self.closed_meshes == 0 && self.interior.medium_id(scene) == medium
     }
 
     /// Crosses a surface. Returns false if nothing lies behind it: the ray leaves the closed mesh, such as a room, that

@@ -100,7 +100,7 @@ impl CameraPaths<'_> {
             origin: ray.origin,
             direction: ray.direction,
             throughput: Rgb::ONE,
-            interior: self.interior.at(self.scene, ray.origin),
+            interior: self.interior.at(self.scene, ray.origin).decided(self.scene, draws),
             leaving: None,
             first: PrecomputedHit::Unknown,
             far: false,

@@ -5,6 +5,7 @@ use super::cause::Cause;
 use super::gathering_walk::GatheringWalk;
 use super::glint::GlintGather;
 use super::glint::Onward;
+use super::interior::Presence;
 use super::lobe_gather::LobeGather;
 use super::lobe_layers::FirstScatter;
 use super::photon_batch::Batch;
@@ -82,9 +83,10 @@ impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, 
             glints.extend_reach(reach2);
         }
         let mut batch = Batch::new(self.kernel, radii, self.waiting, vertex, broad, broad | sharp);
+        let Presence { absent, .. } = vertex.presence(self.scene);
         let near = &mut self.near[kind as usize];
         let push = |photon: &Photon, distance2| {
-            if u32::from(photon.depth) <= longest {
+            if u32::from(photon.depth) <= longest && photon.tag.absent() == absent {
                 if let Some(glints) = &mut glints {
                     let light = glints.push(photon, distance2);
                     if counts && light != Rgb::ZERO {
@@ -147,7 +149,7 @@ fn gather_dispersed(
     mut push: impl FnMut(&Photon, f32),
 ) {
     photons.gather(near, vertex.surface.p, vertex.surface.ng, reach2, |photon, distance2| {
-        if let Some(weight) = wavelength.connection_factor(photon.band) {
+        if let Some(weight) = wavelength.connection_factor(photon.tag.band()) {
             push(&Photon { flux: photon.flux * weight, ..*photon }, distance2);
         }
     });

@@ -5,13 +5,19 @@
 //! paths of both directions agree. A surface is a boundary only if different materials fill the space on its two sides;
 //! otherwise it does not scatter \[Schmidt and Budge 2002, "Simple Nested Dielectrics in Ray Traced Images"\]. A path
 //! that leaves a solid that it never entered (camera or light were inside) is taken to have been in it.
+//!
+//! Alpha decides once, where a path enters a solid or starts in it, whether the solid exists until the path leaves it.
+//! Two subpaths that are joined inside have both decided. They are joined only if they agree, and the product of the
+//! probabilities of their common decisions ([`Presence::chance`]), which both have sampled, divides the contribution
+//! and multiplies the density of the technique in MIS weights.
 
 use crate::geometry::Placement;
 use crate::material::{Material, MediumParameters};
 use crate::math::Vec3;
 use crate::medium::{GridRay, MediumGrids};
+use crate::random::{Draws, Purpose};
 use crate::scene::contact::{self, ContactPoint};
-use crate::scene::{EMPTY_STACK, Scene, SolidStack};
+use crate::scene::{ABSENT, EMPTY_STACK, Scene, SolidStack};
 use crate::spectrum::Wavelength;
 use crate::trace::Ray;
 use smallvec::SmallVec;
@@ -31,7 +37,8 @@ struct Boundary {
     leaves: bool,
 }
 
-/// The solids around a path in order of entry, each by the instance through whose surface the path entered.
+/// The solids around a path in order of entry, each by the instance through whose surface the path entered, with the
+/// bit [`ABSENT`] if alpha has decided that the solid does not exist for the path.
 #[derive(Clone, Copy, Debug)]
 pub struct Interior {
     inside: [u32; MAX_STORED_SOLIDS],
@@ -51,6 +58,34 @@ impl Default for Interior {
     /// The open space: no solid is around the path.
     fn default() -> Interior {
         Interior { inside: [0; MAX_STORED_SOLIDS], len: 0, outer: EMPTY_STACK }
+    }
+}
+
+/// What alpha has decided about the solids around a path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Presence {
+    /// Code of the solids that do not exist for the path. Paths with equal codes at a point agree about the solids there
+    /// ([`crate::scene::AlphaSolid::code`]).
+    pub absent: u8,
+    /// Probability of the decisions.
+    pub chance: f32,
+}
+
+impl Presence {
+    /// No solid with alpha is around the path.
+    pub const CERTAIN: Presence = Presence { absent: 0, chance: 1.0 };
+
+    /// The decisions about the solids in `interior`.
+    #[inline(always)]
+    pub fn of(scene: &Scene, interior: &Interior) -> Presence {
+        if scene.alpha_solids.is_empty() { Presence::CERTAIN } else { interior.presence(scene) }
+    }
+
+    /// The decisions about the solids on both sides of a surface, which may itself bound a solid with alpha that exists.
+    #[inline(always)]
+    pub fn at_surface(scene: &Scene, sides: [&Interior; 2]) -> Presence {
+        let [here, behind] = sides.map(|side| Presence::of(scene, side));
+        if here.chance < behind.chance { here } else { behind }
     }
 }
 
@@ -93,22 +128,89 @@ impl Interior {
         true
     }
 
-    /// Leaves the innermost solid of the instance's object. Returns false if the path is in none.
+    /// Leaves the innermost solid of the instance's object. Returns its entry; `None` if the path is in none.
     #[inline]
-    fn remove(&mut self, scene: &Scene, instance: u32) -> bool {
-        let object_of = |instance: u32| scene.shapes.instances[instance as usize].object;
-        if let Some(at) = self.entries().iter().rposition(|&entry| object_of(entry) == object_of(instance)) {
+    fn remove(&mut self, scene: &Scene, instance: u32) -> Option<u32> {
+        let object = object_of(scene, instance);
+        if let Some(at) = self.entries().iter().rposition(|&entry| object_of(scene, entry) == object) {
+            let entry = self.inside[at];
             self.inside.copy_within(at + 1.., at);
             self.len -= 1;
             self.refill(scene);
-            return true;
+            return Some(entry);
         }
         if self.outer == EMPTY_STACK {
-            return false;
+            return None;
         }
-        let left = remove_solid(scene, self.outer, object_of(instance));
-        self.outer = left.unwrap_or(self.outer);
-        left.is_some()
+        let (outer, entry) = remove_solid(scene, self.outer, object)?;
+        self.outer = outer;
+        Some(entry)
+    }
+
+    /// The solids behind the surface of a solid that alpha lets not exist for the path: it enters the absent solid, or
+    /// leaves one that was absent on entry, or that it never entered. `None` if it leaves a solid that exists.
+    #[inline]
+    pub fn pass_absent(&self, scene: &Scene, instance: u32, entering: bool) -> Option<Interior> {
+        let mut interior = *self;
+        if entering {
+            interior.push(scene, instance | ABSENT);
+            return Some(interior);
+        }
+        let entry = interior.remove(scene, instance);
+        entry.is_none_or(|entry| entry & ABSENT != 0).then_some(interior)
+    }
+
+    /// The solids around the start of a path, of which alpha decides whether they exist.
+    #[inline(always)]
+    pub fn decided(self, scene: &Scene, draws: Draws) -> Interior {
+        if scene.alpha_solids.is_empty() || self.is_open() {
+            return self;
+        }
+        self.decide(scene, draws.token(Purpose::Alpha))
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn decide(self, scene: &Scene, token: u32) -> Interior {
+        let mut decided = Interior::default();
+        let mut push = |entry: u32| {
+            let exists = scene.starts_in_solid(entry & !ABSENT, token);
+            decided.push(scene, if exists { entry } else { entry | ABSENT });
+        };
+        let mut outer = SmallVec::<[u32; 8]>::new();
+        self.for_each_outer(scene, |entry| outer.push(entry));
+        outer.into_iter().rev().for_each(&mut push);
+        self.entries().iter().copied().for_each(&mut push);
+        decided
+    }
+
+    /// Calls `each` with the entries of the outer solids, innermost first.
+    fn for_each_outer(&self, scene: &Scene, mut each: impl FnMut(u32)) {
+        let mut stack = self.outer;
+        while stack != EMPTY_STACK {
+            let SolidStack { outer, last, .. } = scene.solid_stacks.get(stack);
+            each(last);
+            stack = outer;
+        }
+    }
+
+    /// What alpha has decided about the solids.
+    #[cold]
+    #[inline(never)]
+    fn presence(&self, scene: &Scene) -> Presence {
+        let Presence { mut absent, mut chance } = Presence::CERTAIN;
+        let mut count = |entry: u32| {
+            let solid = scene.alpha_solids[(entry & !ABSENT) as usize];
+            if entry & ABSENT == 0 {
+                chance *= solid.chance;
+            } else {
+                chance *= 1.0 - solid.chance;
+                absent ^= solid.code;
+            }
+        };
+        self.entries().iter().copied().for_each(&mut count);
+        self.for_each_outer(scene, count);
+        Presence { absent, chance }
     }
 
     /// Takes a solid back from the stack after one was removed.
@@ -176,6 +278,13 @@ impl Interior {
         self
     }
 
+    /// Identifier of the medium around the path, whose photons it gathers: the index of its material, or `u32::MAX` for
+    /// the medium that fills the scene. It also tells which solids with alpha are absent.
+    #[inline]
+    pub fn medium_id(&self, scene: &Scene) -> u32 {
+        self.material(scene).unwrap_or(u32::MAX) ^ u32::from(Presence::of(scene, self).absent) << 24
+    }
+
     /// Index of the material that fills the space around the path; `None` is the open space.
     #[inline]
     pub fn material(&self, scene: &Scene) -> Option<u32> {
@@ -188,9 +297,10 @@ impl Interior {
     /// Index of the instance whose material fills the space around the path; `None` is the open space.
     #[inline(never)]
     pub fn host(&self, scene: &Scene) -> Option<u32> {
+        let present = self.entries().iter().copied().filter(|entry| entry & ABSENT == 0);
         // `max_by_key` returns the last of equal ones, which belong to one object.
-        let inner = self.entries().iter().copied().max_by_key(|&instance| strength(scene, instance));
-        if self.outer == EMPTY_STACK { inner } else { inner.map(|inner| stronger(scene, self.outer, inner)) }
+        let inner = present.max_by_key(|&instance| strength(scene, instance));
+        if self.outer == EMPTY_STACK { inner } else { stronger(scene, self.outer, inner) }
     }
 
     /// The medium that fills the space around the path; `None` without one.
@@ -236,7 +346,7 @@ impl Interior {
         let mut before = self.material(scene);
         if entering {
             interior.push(scene, instance);
-        } else if !interior.remove(scene, instance) {
+        } else if interior.remove(scene, instance).is_none() {
             before = Some(scene.shapes.instances[instance as usize].material);
         }
         Crossing { before, after: interior.material(scene), interior }
@@ -250,30 +360,38 @@ fn strength(scene: &Scene, instance: u32) -> (i32, u32) {
     (scene.materials.list[material as usize].priority, scene.ranks[instance as usize])
 }
 
+/// The object that an entry of an [`Interior`] belongs to.
+#[inline]
+fn object_of(scene: &Scene, entry: u32) -> u32 {
+    scene.shapes.instances[(entry & !ABSENT) as usize].object
+}
+
 /// The instance that fills the space, out of the host of `stack` and `inner`.
-fn stronger(scene: &Scene, stack: u32, inner: u32) -> u32 {
+fn stronger(scene: &Scene, stack: u32, inner: Option<u32>) -> Option<u32> {
     if stack == EMPTY_STACK {
         return inner;
     }
-    let outer = scene.solid_stacks.get(stack).host;
-    if strength(scene, outer) > strength(scene, inner) { outer } else { inner }
+    // Of equal ones the later, `inner`.
+    scene.solid_stacks.get(stack).host.into_iter().chain(inner).max_by_key(|&instance| strength(scene, instance))
 }
 
 /// Adds a solid to a stack; `None` if there are too many stacks.
 fn push_solid(scene: &Scene, outer: u32, last: u32) -> Option<u32> {
-    scene.solid_stacks.push(SolidStack { outer, last, host: stronger(scene, outer, last) })
+    let host = stronger(scene, outer, (last & ABSENT == 0).then_some(last));
+    scene.solid_stacks.push(SolidStack { outer, last, host })
 }
 
-/// Removes the last solid of an object from a stack; `None` if the stack has none.
-fn remove_solid(scene: &Scene, stack: u32, object: u32) -> Option<u32> {
+/// Removes the last solid of an object from a stack. Returns the stack and the entry; `None` if the stack has none.
+fn remove_solid(scene: &Scene, stack: u32, object: u32) -> Option<(u32, u32)> {
     if stack == EMPTY_STACK {
         return None;
     }
     let SolidStack { outer, last, .. } = scene.solid_stacks.get(stack);
-    if scene.shapes.instances[last as usize].object == object {
-        return Some(outer);
+    if object_of(scene, last) == object {
+        return Some((outer, last));
     }
-    push_solid(scene, remove_solid(scene, outer, object)?, last)
+    let (outer, entry) = remove_solid(scene, outer, object)?;
+    Some((push_solid(scene, outer, last)?, entry))
 }
 
 /// Index of refraction of a material that fills space; 1 in the open.

@@ -2,13 +2,14 @@
 
 use super::camera_paths::Indirect;
 use super::initial_media::InitialMedia;
+use super::interior::Presence;
 use super::segment::{PrecomputedHit, token};
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::{PathStart, walk};
 use crate::bsdf::{LobeSet, Transport};
-use crate::light::{EmissionDensity, Guide, Region, guide};
+use crate::light::{EmissionDensity, Emitter, Guide, Region, VolumeLight, guide};
 use crate::math::{DVec2, DVec3, Rgb, Vec2};
-use crate::photon::{ByKind, Kind, Photon, PhotonFlags, ThinningKey, VolumePhoton};
+use crate::photon::{ByKind, Kind, Photon, PhotonFlags, PhotonTag, ThinningKey, VolumePhoton};
 use crate::plan::ClassSet;
 use crate::random::{Domain, GOLDEN, Purpose, SobolPair, Stream, Streams, mix};
 use crate::scene::Scene;
@@ -205,11 +206,16 @@ impl<'a> LightPaths<'a> {
             flux *= medium.transmittance(f32::INFINITY);
         }
         let (origin, direction) = (emission.origin, emission.direction);
-        let mut interior = initial_media.light(scene, emission.light, origin);
+        let draws = stream.vertex(0);
+        let mut interior = initial_media.light(scene, emission.light, origin).decided(scene, draws);
+        if let Emitter::Volume(VolumeLight { instance, .. }) = &lights.emitters()[emission.light as usize]
+            && interior.host(scene) != Some(*instance)
+        {
+            return None;
+        }
         let leaving = ContactPoint::on_light(scene, emission.light, origin);
         if let Some(place) = &leaving {
-            interior =
-                interior.before_entering(scene, place, direction, token(scene, stream.vertex(0), Purpose::Alpha));
+            interior = interior.before_entering(scene, place, direction, token(scene, draws, Purpose::Alpha));
         }
         Some(Emitted {
             start: PathStart {
@@ -338,16 +344,17 @@ impl<'a> Visitor<'a> for Deposit<'_> {
         let gathers = vertex.shading.bsdf.lobes() != LobeSet::DELTA;
         let kind = if self.caustic { Kind::Caustic } else { Kind::Indirect };
         if scattered.is_some() && gathers && self.kinds[kind as usize] {
+            let Presence { absent, chance } = vertex.presence(self.scene);
             let thinning_key =
                 self.weight.map(|weight| ThinningKey::new(weight * self.scale, vertex.draws.one(Purpose::ThinningKey)));
             self.photons.surface[kind as usize].push(Photon {
                 p: vertex.surface.p,
                 wi: vertex.wo,
                 ng: vertex.surface.ng,
-                flux: vertex.throughput * self.scale,
+                flux: vertex.throughput * (self.scale / chance),
                 flags: self.flags,
                 depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
-                band: Band::of_wavelength(vertex.wavelength.as_ref()),
+                tag: PhotonTag::new(Band::of_wavelength(vertex.wavelength.as_ref()), absent),
                 thinning_key: thinning_key.unwrap_or_default(),
             });
         }
@@ -363,7 +370,7 @@ impl<'a> Visitor<'a> for Deposit<'_> {
             self.photons.volume.push(VolumePhoton {
                 p: vertex.arrival.p,
                 wi: vertex.wo,
-                flux: vertex.arriving * self.scale,
+                flux: vertex.arriving * (self.scale / vertex.presence(self.scene).chance),
                 medium: vertex.medium_id(self.scene),
                 depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
                 band: Band::of_wavelength(vertex.wavelength.as_ref()),

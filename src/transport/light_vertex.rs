@@ -1,5 +1,6 @@
 //! Vertices of light paths to which camera vertices are connected.
 
+use super::interior::Presence;
 use super::mis::MisState;
 use crate::bsdf::{LobeSet, Shading, Transport};
 use crate::geometry::Surface;
@@ -37,6 +38,10 @@ pub struct LightVertex<'s> {
     pub dispersed: bool,
     /// Light group of the light that the path starts from.
     pub group: Group,
+    /// What alpha has decided about the solids on the side of `wo`, and on the other side of the surface.
+    pub presence: [Presence; 2],
+    /// Probability of the decisions that a camera vertex joined with the vertex before this one would repeat.
+    pub chance_before: f32,
 }
 
 impl LightVertex<'_> {
@@ -108,6 +113,23 @@ impl LightVertex<'_> {
                 (Rgb::splat(f), f)
             }
         }
+    }
+
+    /// What alpha has decided about the solids on the side of `w`.
+    #[inline]
+    pub fn presence(&self, w: Vec3) -> Presence {
+        let crosses = match &self.scatterer {
+            Scatterer::Surface(surface, _) => w.dot(surface.ng) * self.wo.dot(surface.ng) < 0.0,
+            Scatterer::Medium(..) => false,
+        };
+        self.presence[usize::from(crosses)]
+    }
+
+    /// Probability of the decisions of alpha that a camera path merged at this vertex would repeat.
+    #[inline]
+    pub fn merge_chance(&self) -> f64 {
+        let [here, behind] = self.presence;
+        f64::from(here.chance.min(behind.chance))
     }
 
     /// Density with which a camera path that arrives along `wi` would continue along the light path.

@@ -4,7 +4,7 @@
 //! behind. Light paths start from them, and next-event estimation samples them, as any other light. Shadow rays and
 //! light paths do not hit them. So all techniques sample the same paths with the same densities.
 
-use super::segment::{ShadowRay, Start, shadow_ray};
+use super::segment::{Destination, ShadowRay, Start, shadow_ray};
 use crate::geometry::Surface;
 use crate::light::Group;
 use crate::math::{Rgb, Vec3};
@@ -43,7 +43,13 @@ pub(super) fn for_each_pass_through_light(
         let Start { origin, direction, token, .. } = *start;
         let mut met = |hit: Hit| {
             let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else { return };
-            let between = ShadowRay { start: *start, tmax: hit.t, reaching: None, in_medium: [from_medium, false] };
+            let between = ShadowRay {
+                start: *start,
+                tmax: hit.t,
+                reaching: None,
+                in_medium: [from_medium, false],
+                destination: Destination::Any,
+            };
             let visibility = shadow_ray(scene, &between);
             if visibility.transmittance != Rgb::ZERO {
                 each(&surface, hit.t, visibility.transmittance, visibility.flight);
@@ -78,7 +84,13 @@ pub(super) fn for_each_bulb(
     // Media attenuate the light of the bulb's points differently.
     let u = if scene.survey.media { draws.one(Purpose::Bulb) } else { 0.5 };
     scene.lights.for_each_bulb((start.origin, start.direction), reach, camera, u, |radiance, distance, group| {
-        let between = ShadowRay { start: *start, tmax: distance, reaching: None, in_medium: [from_medium, false] };
+        let between = ShadowRay {
+            start: *start,
+            tmax: distance,
+            reaching: None,
+            in_medium: [from_medium, false],
+            destination: Destination::Any,
+        };
         let light = radiance * shadow_ray(scene, &between).transmittance;
         if light != Rgb::ZERO {
             each(light, start.origin + start.direction * distance, group);

@@ -1,6 +1,7 @@
 //! Merging of photons with multiple importance sampling.
 
 use super::bidirectional::{MergeLevels, PathKind, PathRecorder, Technique};
+use super::interior::Presence;
 use super::lobe_layers::{FirstScatter, LobeHistory};
 use super::mis::{self, Merges, MisState};
 use super::scattering_vertex::ScatterPoint;
@@ -38,6 +39,8 @@ pub struct MergePhoton {
     band: Band,
     /// Light group of the light that the path starts from.
     group: Group,
+    /// Code of the solids around that alpha lets not exist for the light path ([`Presence::absent`]).
+    absent: u8,
 }
 
 impl Located for MergePhoton {
@@ -66,7 +69,7 @@ fn single(sum: f64) -> f32 {
 
 impl MergePhoton {
     /// The photon that a light path leaves at `vertex`. `joins` is the number of samples of the technique that joins the
-    /// last two vertices of the light path.
+    /// last two vertices of the light path, `presence` what alpha has decided about the solids at the vertex.
     #[inline]
     pub fn new(
         vertex: &Vertex<'_, '_>,
@@ -75,12 +78,13 @@ impl MergePhoton {
         group: Group,
         mis: &MisState,
         joins: f64,
+        presence: Presence,
     ) -> MergePhoton {
         MergePhoton {
             p: vertex.surface.p,
             wi: vertex.wo,
             ng: vertex.surface.ng,
-            flux,
+            flux: flux / presence.chance,
             d_vcm: single(mis.d_vcm * joins),
             plain: single(mis.plain),
             merged: single(mis.merged.y + mis.last.y),
@@ -88,6 +92,7 @@ impl MergePhoton {
             prefix,
             band: Band::of_wavelength(vertex.wavelength.as_ref()),
             group,
+            absent: presence.absent,
         }
     }
 
@@ -107,6 +112,8 @@ pub(super) struct Merge<'a> {
     pub mis: &'a MisState,
     /// Number of samples of the technique that joins the last two vertices of the camera path.
     pub joins: f64,
+    /// Code of the solids around the vertex that alpha lets not exist ([`Presence::absent`]).
+    pub absent: u8,
     /// Coefficients with which a merge at this vertex counts in MIS weights ([`mis::one_merge`]).
     pub own: Merges,
     /// Class of the camera path up to the vertex: the kinds of its bounces.
@@ -135,7 +142,7 @@ impl Merge<'_> {
         let (ng, shading) = (vertex.surface.ng, vertex.shading);
         let mut photon_shares = PhotonShares::new(vertex, self.suffix, self.classes);
         self.photons.within(vertex.surface.p, largest, |photon, distance2| {
-            if !same_surface(photon, ng) || u32::from(photon.depth) > self.longest {
+            if !same_surface(photon, ng) || u32::from(photon.depth) > self.longest || photon.absent != self.absent {
                 return;
             }
             let wavelength = vertex.wavelength.as_ref();

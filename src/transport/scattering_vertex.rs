@@ -3,10 +3,10 @@
 use super::interior::Interior;
 use super::lobe_layers::FirstScatter;
 use super::roulette::survival;
-use super::segment::{ShadowRay, Start, Visibility, shadow_ray};
+use super::segment::{Destination, ShadowRay, Start, Visibility, shadow_ray};
 use super::vertex::{MediumVertex, Vertex};
 use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
-use crate::light::{DirectSample, Receiver};
+use crate::light::{DirectSample, Emitter, Receiver, VolumeLight};
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::medium::HenyeyGreenstein;
 use crate::random::Draws;
@@ -78,14 +78,18 @@ pub trait ScatterPoint {
     /// Traces a shadow ray along `wi` to `target` (`None`: out of the scene).
     #[inline]
     fn shadow_ray(&self, scene: &Scene, wi: Vec3, target: Option<Vec3>, token: u32) -> Visibility {
-        self.shadow_ray_to(scene, wi, target, token, false, None)
+        self.shadow_ray_to(scene, wi, target, token, (false, None), Destination::Any)
     }
 
     /// Traces a shadow ray to a sampled light.
     #[inline]
     fn shadow_ray_to_light(&self, scene: &Scene, light: &DirectSample, token: u32) -> Visibility {
         let reaching = light.target.and_then(|target| ContactPoint::on_light(scene, light.light, target));
-        self.shadow_ray_to(scene, light.wi, light.target, token, false, reaching)
+        let destination = match scene.lights.emitters().get(light.light as usize) {
+            Some(Emitter::Volume(VolumeLight { instance, .. })) if scene.survey.fire => Destination::Inside(*instance),
+            _ => Destination::Any,
+        };
+        self.shadow_ray_to(scene, light.wi, light.target, token, (false, reaching), destination)
     }
 
     /// Traces a shadow ray to a vertex, which may lie in a medium, or to a point on a surface on which others lie.
@@ -96,8 +100,8 @@ pub trait ScatterPoint {
         wi: Vec3,
         target: Option<Vec3>,
         token: u32,
-        to_medium: bool,
-        reaching: Option<ContactPoint>,
+        (to_medium, reaching): (bool, Option<ContactPoint>),
+        destination: Destination,
     ) -> Visibility {
         let origin = self.ray_origin(wi);
         let (direction, tmax) = match target {
@@ -116,7 +120,7 @@ pub trait ScatterPoint {
         }
         let interior = *self.interiors()[usize::from(self.crosses(wi))];
         let start = Start { origin, direction, interior, leaving, token };
-        shadow_ray(scene, &ShadowRay { start, tmax, reaching, in_medium: [Self::IN_MEDIUM, to_medium] })
+        shadow_ray(scene, &ShadowRay { start, tmax, reaching, in_medium: [Self::IN_MEDIUM, to_medium], destination })
     }
 }
 

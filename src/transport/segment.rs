@@ -1,7 +1,7 @@
 //! Rays from one scattering vertex to the next, through alpha cut-outs (Embree skips them) and boundaries that do not
 //! scatter; and shadow rays.
 
-use super::interior::{Crossing, Interior, ior};
+use super::interior::{Crossing, Interior, Presence, ior};
 use crate::geometry::Surface;
 use crate::material::MediumParameters;
 use crate::math::{Rgb, Vec3};
@@ -200,13 +200,13 @@ fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Ve
         return Boundary::Scattering(material.ior / around, None);
     }
     let entering = direction.dot(surface.ng) < 0.0;
-    let crossing = interior.crossing(scene, surface.instance, entering);
-    // A ray that passed the front of a solid through a cut-out is not inside, and so it ignores the back.
     if material.has_alpha_per_entry()
-        && if entering { !scene.solid_is_present(surface, token) } else { crossing.interior == *interior }
+        && !(entering && scene.solid_is_present(surface, token))
+        && let Some(behind) = interior.pass_absent(scene, surface.instance, entering)
     {
-        return Boundary::None(Rgb::ONE, *interior);
+        return Boundary::None(Rgb::ONE, behind);
     }
+    let crossing = interior.crossing(scene, surface.instance, entering);
     // A surface that emits light is never skipped.
     if crossing.is_nothing() && !material.emits() {
         return Boundary::None(Rgb::ONE, crossing.interior);
@@ -379,6 +379,28 @@ struct RayPart<'i> {
     random: (u32, u32),
 }
 
+/// The solids in which a shadow ray must arrive at its end. Otherwise it counts as blocked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Destination {
+    /// Any solids.
+    Any,
+    /// Solids with alpha of which those with this code are absent ([`Presence::absent`]).
+    Agreeing(u8),
+    /// Solids of which this instance fills the space.
+    Inside(u32),
+}
+
+impl Destination {
+    #[inline(always)]
+    fn admits(self, scene: &Scene, interior: &Interior) -> bool {
+        match self {
+            Destination::Any => true,
+            Destination::Agreeing(absent) => Presence::of(scene, interior).absent == absent,
+            Destination::Inside(instance) => interior.host(scene) == Some(instance),
+        }
+    }
+}
+
 /// A shadow ray: a ray to a point or to infinity.
 #[derive(Clone, Copy)]
 pub struct ShadowRay {
@@ -390,6 +412,8 @@ pub struct ShadowRay {
     pub reaching: Option<ContactPoint>,
     /// Whether the shadow ray starts at a vertex in a medium, and whether it ends at one.
     pub in_medium: [bool; 2],
+    /// The solids in which the shadow ray must arrive.
+    pub destination: Destination,
 }
 
 /// Transmittance along a shadow ray (zero if a scattering surface blocks it, otherwise that of media and tinted
@@ -402,7 +426,7 @@ pub fn shadow_ray(scene: &Scene, between: &ShadowRay) -> Visibility {
     if scene.survey.null_boundaries || culls || leaving.is_some() || reaching.is_some() {
         return trace_through_boundaries(scene, between);
     }
-    if scene.tracer.occluded(&Ray { origin, direction, tmax, token }) {
+    if !between.destination.admits(scene, interior) || scene.tracer.occluded(&Ray { origin, direction, tmax, token }) {
         return Visibility::BLOCKED;
     }
     let mut visibility = Visibility::CLEAR;
@@ -422,8 +446,8 @@ fn trace_through_boundaries(scene: &Scene, between: &ShadowRay) -> Visibility {
             let distance = along.ray().tmax.max(0.0);
             let part = RayPart { interior: &interior, origin: before, direction, distance, random };
             visibility.pass(scene, part, starts, ends);
-            let Some(place) = reaching else { return visibility };
-            for surface in &contact::surfaces_before(scene, &place, direction, token) {
+            let touching = reaching.map(|place| contact::surfaces_before(scene, &place, direction, token));
+            for surface in touching.iter().flatten() {
                 match boundary(scene, surface, &interior, direction, token) {
                     Boundary::Scattering(..) => return Visibility::BLOCKED,
                     Boundary::None(tint, behind) => {
@@ -431,7 +455,7 @@ fn trace_through_boundaries(scene: &Scene, between: &ShadowRay) -> Visibility {
                     }
                 }
             }
-            return visibility;
+            return if between.destination.admits(scene, &interior) { visibility } else { Visibility::BLOCKED };
         };
         if t > 0.0 {
             let part = RayPart { interior: &interior, origin: before, direction, distance: t, random };

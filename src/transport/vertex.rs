@@ -1,6 +1,6 @@
 //! Vertices of a path, and the visitor that receives them.
 
-use super::interior::Interior;
+use super::interior::{Interior, Presence};
 use super::pass_through::{BulbHit, PassThroughHit};
 use super::pixel_sample::Features;
 use super::roulette::survival;
@@ -52,6 +52,12 @@ impl Vertex<'_, '_> {
             normal: if n.dot(self.wo) < 0.0 { -n } else { n },
             depth: length,
         }
+    }
+
+    /// What alpha has decided about the solids on both sides of the surface.
+    #[inline(always)]
+    pub fn presence(&self, scene: &Scene) -> Presence {
+        Presence::at_surface(scene, [&self.interior, &self.interior_behind])
     }
 
     /// Probability that roulette lets the path continue if the visitor asks for the lobes in `set`. It does not depend
@@ -112,10 +118,16 @@ impl MediumVertex {
         Rgb::select(sigma_t.cmpgt(Rgb::ZERO), self.arrival.medium.sigma_s / sigma_t, Rgb::ZERO)
     }
 
-    /// Identifier of the medium: the index of its material, or `u32::MAX` for the medium that fills the scene.
+    /// What alpha has decided about the solids around the vertex.
+    #[inline(always)]
+    pub fn presence(&self, scene: &Scene) -> Presence {
+        Presence::of(scene, &self.arrival.interior)
+    }
+
+    /// Identifier of the medium ([`Interior::medium_id`]).
     #[inline]
     pub fn medium_id(&self, scene: &Scene) -> u32 {
-        self.arrival.interior.material(scene).unwrap_or(u32::MAX)
+        self.arrival.interior.medium_id(scene)
     }
 }
 

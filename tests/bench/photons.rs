@@ -5,9 +5,9 @@
 #![allow(clippy::disallowed_methods, reason = "benchmarks are what clocks are for")]
 
 use caustique::math::{Rgb, Vec3};
-use caustique::photon::{Nearest, Photon, PhotonFlags, PhotonMap, ThinningKey};
+use caustique::photon::{Nearest, Photon, PhotonFlags, PhotonMap, PhotonTag, ThinningKey};
 use caustique::random::{Domain, Purpose, Stream};
-use caustique::spectrum::Band;
+
 use std::time::Instant;
 
 const PHOTONS: u64 = 200_000;
@@ -174,7 +174,7 @@ fn main() {
             flux: Rgb::ONE,
             flags: PhotonFlags::default(),
             depth: 2,
-            band: Band::WHITE,
+            tag: PhotonTag::default(),
             thinning_key: ThinningKey::default(),
         };
         let t = Instant::now();

@@ -7,11 +7,11 @@
 use caustique::film::{Layer, LayerSet};
 use caustique::image::exr;
 use caustique::math::{Rgb, Vec2, Vec3, warp};
-use caustique::photon::{Photon, PhotonFlags, PhotonMap, ThinningKey};
+use caustique::photon::{Photon, PhotonFlags, PhotonMap, PhotonTag, ThinningKey};
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::scene::gltf::{ReadOptions, read};
 use caustique::scene::{CameraRequest, Scene};
-use caustique::spectrum::Band;
+
 use caustique::trace::Ray;
 use caustique_embree as embree;
 use std::time::Instant;
@@ -131,7 +131,7 @@ fn main() {
                 flux: Rgb::ONE,
                 flags,
                 depth: 2,
-                band: Band::WHITE,
+                tag: PhotonTag::default(),
                 thinning_key: ThinningKey::default(),
             }
         })
