@@ -76,7 +76,8 @@ fn choose_untimed(view: View<'_>, settings_of: &impl Fn(Candidate) -> Option<Set
         pilot.run(effects_seconds, &settings_of_pilot, &late)
     };
     let chosen = pilots.iter().find(|pilot| pilot.chosen);
-    let candidate = chosen.map_or_else(|| candidate_without_pilot(view.scene, settings_of), |chosen| chosen.candidate);
+    let without_pilot = || candidate_without_pilot(view, &pilot, settings_of);
+    let candidate = chosen.map_or_else(without_pilot, |chosen| chosen.candidate);
     let settings = settings_of(candidate)?;
     let cost = &pilot.cost;
     let weights =
@@ -86,10 +87,23 @@ fn choose_untimed(view: View<'_>, settings_of: &impl Fn(Candidate) -> Option<Set
     Some(Choice { settings, candidate, pilots, weights, reason, seconds_per_iteration, spent: TimeSpent::default() })
 }
 
-/// The first candidate that the user's options allow, taken where no pilot is rendered.
-fn candidate_without_pilot(scene: &Scene, settings_of: &impl Fn(Candidate) -> Option<Settings>) -> Candidate {
-    let mut candidates = pilot::candidates_for_focused_light(scene).iter().chain(&[Candidate::DEFAULT]).copied();
-    candidates.find(|candidate| settings_of(*candidate).is_some()).unwrap_or(Candidate::GATHERING)
+/// The candidate that is taken where no pilot is rendered: the first one whose iteration is not too long, or the one with
+/// the shortest iteration, among those that the user's options allow.
+fn candidate_without_pilot(
+    view: View<'_>,
+    pilot: &Pilot<'_>,
+    settings_of: &impl Fn(Candidate) -> Option<Settings>,
+) -> Candidate {
+    let usual = pilot::candidates_for_focused_light(view.scene).iter().chain(&[Candidate::DEFAULT]).copied();
+    let with_seconds = |candidate| {
+        let settings = settings_of(candidate)?;
+        Some((candidate, pilot.cost.film_seconds(candidate, &settings, view.camera)))
+    };
+    let cheaper = pilot.cheaper_candidates(settings_of);
+    let all: Vec<(Candidate, f64)> = usual.chain(cheaper).filter_map(with_seconds).collect();
+    let least = all.iter().map(|(_, seconds)| *seconds).fold(f64::INFINITY, f64::min);
+    let longest = pilot.longest_iteration(least, 0.0).min(pilot::MAX_COST_RATIO * least);
+    all.iter().find(|(_, seconds)| *seconds <= longest).map_or(Candidate::GATHERING, |(candidate, _)| *candidate)
 }
 
 /// Core-seconds of an iteration, predicted from the counted vertices of sampled paths.

@@ -36,6 +36,23 @@ const CONNECTIONS: [u32; 4] = [0, 1, 2, 4];
 /// Core-seconds that one second of the time limit `--time` counts as, on every machine. It is small, so that on most
 /// machines pilots take less than their share; on one core they take twice their share.
 const ASSUMED_CORES: f64 = 2.0;
+/// Largest share of the time limit that an iteration may take, so that a picture has the iterations that its finish and
+/// its error estimate need.
+const MAX_ITERATION_SHARE: f64 = 1.0 / 16.0;
+/// Largest cost of an iteration relative to the cheapest one, if all take more than [`MAX_ITERATION_SHARE`].
+const MAX_LONG_RATIO: f64 = 2.0;
+/// Largest cost of an iteration relative to the cheapest one that is not too long for a render without a pilot. The cost
+/// of connections grows with the square of the length of paths, which closed white rooms make thousands of segments.
+pub(super) const MAX_COST_RATIO: f64 = 16.0;
+/// Numbers of samples of cheaper and cheaper candidates, for renders that are too short for a pilot.
+const CHEAPER: [Counts; 6] = [
+    Counts { light_paths: 8, ..Counts::DEFAULT },
+    Counts { light_paths: 4, ..Counts::DEFAULT },
+    Counts { light_paths: 2, ..Counts::DEFAULT },
+    Counts { light_paths: 1, ..Counts::DEFAULT },
+    Counts { light_paths: 1, connections: 0, merging: 1.0 },
+    Counts::PATHS,
+];
 /// Core-seconds that a render without limits of time and iterations counts as.
 const UNLIMITED_CORE_SECONDS: f64 = 1000.0;
 
@@ -108,14 +125,37 @@ impl<'a> Pilot<'a> {
         let cost = Cost::count(view.scene, view.camera, gathering, None);
         let budget = match (gathering.iterations, gathering.time) {
             (Some(n), time) => {
-                let vcm = Settings { method: Method::Vcm, ..gathering.clone() };
-                let work = n as f64 * cost.iteration_seconds(Candidate::DEFAULT, &vcm, pixels);
+                let seconds = |candidate: Candidate| {
+                    let settings = Settings { method: candidate.method, ..gathering.clone() };
+                    cost.iteration_seconds(candidate, &settings, pixels)
+                };
+                let longest = MAX_COST_RATIO * seconds(Candidate::CAMERA_PATHS);
+                let work = n as f64 * seconds(Candidate::DEFAULT).min(longest);
                 time.map_or(work, |seconds| work.min(seconds * ASSUMED_CORES))
             }
             (None, Some(seconds)) => seconds * ASSUMED_CORES,
             (None, None) => UNLIMITED_CORE_SECONDS,
         };
         Pilot { view, gathering, cost, pixels, budget }
+    }
+
+    /// Largest core-seconds of an iteration of a candidate, if the cheapest candidate takes `least` and the pilot
+    /// `pilot`; infinite without a time limit.
+    pub fn longest_iteration(&self, least: f64, pilot: f64) -> f64 {
+        let limit = |seconds: f64| MAX_ITERATION_SHARE * (seconds * ASSUMED_CORES - pilot);
+        self.gathering.time.map_or(f64::INFINITY, |seconds| limit(seconds).max(MAX_LONG_RATIO * least))
+    }
+
+    /// Candidates that find all light, each with a cheaper iteration than the one before.
+    pub fn cheaper_candidates(
+        &self,
+        settings_of: &impl Fn(Candidate) -> Option<Settings>,
+    ) -> impl Iterator<Item = Candidate> {
+        let presence = Presence::of(self.view.scene, self.view.camera);
+        let finds_all = move |candidate: &Candidate| {
+            settings_of(*candidate).is_some_and(|settings| self.finds_all(settings.method, &presence))
+        };
+        CHEAPER.into_iter().map(|counts| Candidate::with_counts(counts, false)).filter(finds_all)
     }
 
     /// Measures what each effect of the scene adds to the picture. Also returns the predicted core-seconds of the
@@ -171,7 +211,11 @@ impl<'a> Pilot<'a> {
         let Some(size) = self.size(&settings, effects_seconds) else {
             return (Vec::new(), Some("the render is too short to try others"));
         };
-        (chosen_and_usual(self.results(&size, guided, &settings, settings_of, late)), None)
+        let results = self.results(&size, guided, &settings, settings_of, late);
+        let complete = results.iter().filter(|result| result.squared_error.is_finite());
+        let least = complete.map(|result| result.seconds_per_iteration).fold(f64::INFINITY, f64::min);
+        let longest = self.longest_iteration(least, effects_seconds + size.seconds);
+        (chosen_and_usual(results, longest), None)
     }
 
     /// Expected noise of all candidates with or without guided light paths, from one proxy render by `settings`; nothing
@@ -235,8 +279,9 @@ impl<'a> Pilot<'a> {
         let pixels = (self.pixels * wanted / (ITERATIONS * iteration(self.pixels))).clamp(least, MAX_PIXELS.max(least));
         let pixels = pixels.min(self.pixels);
         let iterations = ((wanted / iteration(pixels)) as u64).clamp(MIN_ITERATIONS, MAX_ITERATIONS);
-        ((iterations + 1) as f64 * iteration(pixels) <= most.max(wanted))
-            .then(|| PilotSize { camera: self.view.camera.downscale((pixels / self.pixels).sqrt()), iterations })
+        let seconds = (iterations + 1) as f64 * iteration(pixels);
+        let camera = || self.view.camera.downscale((pixels / self.pixels).sqrt());
+        (seconds <= most.max(wanted)).then(|| PilotSize { camera: camera(), iterations, seconds })
     }
 }
 
@@ -244,12 +289,15 @@ impl<'a> Pilot<'a> {
 struct PilotSize {
     camera: Camera,
     iterations: u64,
+    /// Core-seconds of the proxy, predicted from counted vertices.
+    seconds: f64,
 }
 
-/// Marks the result with the least expected error as chosen, and returns it with the results of `vcm`, `path` and `bdpt`
-/// by default numbers.
-fn chosen_and_usual(mut results: Vec<PilotResult>) -> Vec<PilotResult> {
-    let best = (0..results.len()).min_by(|&a, &b| results[a].squared_error.total_cmp(&results[b].squared_error));
+/// Marks the result with the least expected error as chosen, of those whose iteration takes `longest` core-seconds at
+/// most. Returns it with the results of `vcm`, `path` and `bdpt` by default numbers.
+fn chosen_and_usual(mut results: Vec<PilotResult>, longest: f64) -> Vec<PilotResult> {
+    let short = (0..results.len()).filter(|&index| results[index].seconds_per_iteration <= longest);
+    let best = short.min_by(|&a, &b| results[a].squared_error.total_cmp(&results[b].squared_error));
     if let Some(best) = best {
         results[best].chosen = true;
     }

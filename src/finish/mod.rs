@@ -24,7 +24,7 @@ pub mod temporal;
 mod window;
 
 pub use bound::Clamped;
-pub use denoiser::{Denoiser, DenoiserChoice, Quality, scratch};
+pub use denoiser::{Denoiser, DenoiserChoice, Quality};
 pub use estimate::{Estimate, quarters};
 pub use finished_error::{DEFAULT_CONVERGENCE_RATE, ErrorMap, FinishedError};
 pub use window::{Windows, window};
@@ -36,8 +36,10 @@ use crate::film::kind::Use;
 use crate::film::{
     CAUSTIC, LIGHT_GROUP, LOBE_COLORS, Layer, LayerSet, Picture, Size, finished_part, kind_of, lobe_names, part_names,
 };
+use crate::memory;
 use crate::stop::Stop;
 use bound::Noise;
+use denoiser::scratch;
 use estimate::{alpha, estimate_layers, own_level};
 use finished_error::ErrorEstimator;
 use parts::Part;
@@ -48,6 +50,9 @@ use rayon::prelude::*;
 pub const BYTES_PER_PIXEL: u64 = 384;
 /// Bytes of memory per pixel that the finish needs for each additive part of the picture.
 pub const BYTES_PER_PIXEL_OF_PART: u64 = 36;
+/// Bytes that a finish takes whatever the size of the picture: the library of the denoiser and its network. A bound
+/// found by lowering `ulimit -v` (`no_limit_of_memory_aborts` in `tests/cli/limits.rs`).
+const LIBRARY_BYTES: u64 = 192 << 20;
 /// Name of the layer with the estimated error of every pixel of the finished picture.
 pub const ERROR: &str = "Error";
 
@@ -64,6 +69,20 @@ pub fn reads_for_error(name: &str) -> bool {
 /// Whether the finish reads the layer `name` for the picture, its error, or its parts.
 pub fn reads(name: &str) -> bool {
     reads_for_error(name) || finished_part(name).is_some()
+}
+
+/// Bytes that a finish of a picture of `pixels` pixels takes besides its layers. `parts`: number of its additive parts.
+/// The denoiser works in tiles if memory is short.
+pub fn bytes(pixels: u64, parts: u64) -> u64 {
+    LIBRARY_BYTES + pixels * (BYTES_PER_PIXEL + parts * BYTES_PER_PIXEL_OF_PART) + scratch(pixels)
+}
+
+/// Checks that there is memory to finish a layer set, as far as its size and its `parts` parts decide.
+fn require_memory(set: &LayerSet, parts: usize) -> Result<()> {
+    let (width, height) = (set.width, set.height);
+    let needed = bytes(width as u64 * height as u64, parts as u64) - LIBRARY_BYTES;
+    let outcome = memory::require(needed, format_args!("finishing {width} x {height} pixels with {parts} parts"));
+    outcome.map_err(|error| error.hint("finish the picture where more memory is free, or with fewer --layers"))
 }
 
 /// The finish of renders: denoises pictures within the limits that their standard errors set, and splits them into
@@ -323,10 +342,11 @@ impl Finish {
     /// # Errors
     /// Layers are missing ([`Estimate::of`]), or the denoiser or the network fails; the set is unchanged then.
     pub fn apply(&mut self, set: &mut LayerSet, wanted: impl Fn(&str) -> bool) -> Result<Finished> {
+        let names = parts_to_finish(set, &wanted);
+        require_memory(set, names.len())?;
         let (estimate, combined) = self.estimate(set)?;
         let denoised = self.denoiser.run(&estimate, self.quality, self.stop.as_ref())?;
         let half = quarters(set).map(|quarters| self.picture(&estimate.first_half(&quarters))).transpose()?;
-        let names = parts_to_finish(set, &wanted);
         let parts = names.into_iter().filter_map(|name| set.picture(&name).map(|picture| (name, picture))).collect();
         let error = ErrorSource::of(set, own_level(set));
         let prepared = Prepared { estimate, denoised, half, combined, parts, colors: lobe_colors(set) };
@@ -346,6 +366,7 @@ impl Finish {
     /// # Errors
     /// Layers are missing ([`Estimate::of`]), motion vectors too, or the denoiser or the network fails.
     pub fn frame(&mut self, set: LayerSet) -> Result<temporal::Frame> {
+        require_memory(&set, part_layers(&set).count())?;
         let (estimate, combined) = self.estimate(&set)?;
         let quarters = quarters(&set);
         let motion = temporal::motion(&set)?;

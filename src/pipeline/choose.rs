@@ -2,6 +2,7 @@
 
 use super::check::renders_catchers;
 use super::layers;
+use super::memory::MemoryCheck;
 use super::observer::{Event, Observer, Phase, during};
 use super::request::{MethodRequest, Request};
 use crate::choose::{self, Choice};
@@ -69,13 +70,16 @@ pub(super) fn choose_for_render(
     observer: &mut dyn Observer,
 ) -> Result<Chosen> {
     let (layers, finishes) = (&request.layers, request.finish.is_some());
-    let has_layers = |of: &Settings| layers::check(layers, &layer_shape(of, view.scene), finishes, true).is_ok();
+    let memory = MemoryCheck { view, method: "auto", finishes, limit: request.memory };
+    let fits = memory.admits();
+    let accepts =
+        |of: &Settings| fits(of) && layers::check(layers, &layer_shape(of, view.scene), finishes, true).is_ok();
     let method = &mut request.picture.method;
     let chosen = if let MethodRequest::Auto(_) = method {
         let stop = observer.stop();
-        during(Phase::Choosing, observer, |_| choose(method, checked, view, has_layers, &stop))
+        during(Phase::Choosing, observer, |_| choose(method, checked, view, accepts, &stop))
     } else {
-        choose(method, checked, view, has_layers, &Stop::default())
+        choose(method, checked, view, accepts, &Stop::default())
     };
     observer.event(Event::Chosen(chosen.choice.as_ref()));
     refuse_stop(observer)?;

@@ -116,7 +116,7 @@ pub fn render_live(
         let most = iterations.map_or(MAX_CHOICE_ITERATIONS, |iterations| iterations.min(MAX_CHOICE_ITERATIONS));
         let mut method =
             request.picture.method.map_candidates(|settings| Settings { iterations: Some(most), ..settings });
-        choose(&mut method, checked.settings, view, |_| true, &request.stop)
+        choose(&mut method, checked.settings, view, memory.admits(), &request.stop)
     });
     if request.stop.requested() {
         // A choice that was interrupted is not used again.

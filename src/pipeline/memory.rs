@@ -5,17 +5,19 @@ use crate::error::{Error, Result};
 use crate::estimator::PixelAccumulator;
 use crate::estimator::rule::{adaptive, chi_squared, local};
 use crate::film;
-use crate::finish::{BYTES_PER_PIXEL, BYTES_PER_PIXEL_OF_PART, scratch};
+use crate::film::output::Shape;
+use crate::finish;
 use crate::memory;
 use crate::photon;
 use crate::plan::Search;
 use crate::render::output::layer_shape;
 use crate::render::{
-    BandwidthRule, MAX_TECHNIQUES, PHOTON_BYTES, Settings, WHOLE_TILE, bytes_per_whole_tile, photons_per_path,
-    sample_bytes,
+    BandwidthRule, MAX_TECHNIQUES, PHOTON_BYTES, Settings, ShardResult, WHOLE_TILE, bytes_per_whole_tile,
+    photons_per_path as mean_photons, sample_bytes,
 };
 use crate::scene::View;
 use crate::transport::{FirstScatter, MergePhoton, Splat};
+use std::cell::OnceCell;
 use std::fmt::Display;
 use std::mem::size_of;
 
@@ -32,12 +34,14 @@ const BYTES_PER_TECHNIQUE: u64 = 24;
 /// Number of channels of the layers that a finish with a network reads.
 const FINISH_CHANNELS: usize = 37;
 
-/// Bytes that a finish takes whatever the size of the picture: the library of the denoiser and its network. A bound
-/// found by lowering `ulimit -v` (`no_limit_of_memory_aborts` in `tests/cli/limits.rs`).
-const FINISH_BYTES: u64 = 192 << 20;
-
 /// Smallest number of light paths per iteration that a limit on memory may leave.
 const MIN_PHOTONS: u32 = 1000;
+
+/// Share of the free memory that photons may take if it does not hold all: other programs take memory meanwhile.
+const FREE_SHARE: f64 = 0.75;
+
+/// Mean number of photons per light path above which messages name `--max-depth`. Closed white rooms have thousands.
+const LONG_PATH: f64 = 64.0;
 
 /// The sizes that the memory of a render depends on, besides its settings.
 #[derive(Clone, Copy)]
@@ -57,11 +61,29 @@ struct Extent {
 }
 
 impl Extent {
-    fn new(View { scene, camera }: View<'_>, settings: &Settings, channels: usize) -> Extent {
+    fn new(view: View<'_>, settings: &Settings, channels: usize) -> Extent {
+        let photons_per_path = mean_photons(view.scene, view.camera, settings);
+        Extent::with_photons(view, settings, channels, photons_per_path)
+    }
+
+    fn with_photons(
+        View { scene, camera }: View<'_>,
+        settings: &Settings,
+        channels: usize,
+        photons_per_path: f64,
+    ) -> Extent {
         let [film, whole] = camera.sizes();
         let groups = scene.lights.groups().names.len();
-        let (lobes, photons_per_path) = (settings.lobes, photons_per_path(scene, camera, settings));
-        Extent { film, whole, channels, groups, lobes, photons_per_path }
+        Extent { film, whole, channels, groups, lobes: settings.lobes, photons_per_path }
+    }
+
+    /// Words of a hint that name the length of light paths if they are long; empty otherwise.
+    fn long_paths(&self) -> String {
+        let photons = self.photons_per_path;
+        if photons < LONG_PATH {
+            return String::new();
+        }
+        format!(", or --max-depth {LONG_PATH} for shorter light paths (they have {photons:.0} vertices on average)")
     }
 
     /// Bytes at the end of a render, when its pixels and its layers exist together.
@@ -126,13 +148,25 @@ fn bytes_of_bandwidths(settings: &Settings) -> u64 {
     2 * (settings.levels.count * channels * photon::Kind::ALL.len() * state) as u64
 }
 
-/// Bytes that a finish takes besides pixels and layers; the denoiser works in tiles if memory is short.
+/// Bytes that a finish takes besides pixels and layers.
 fn finish_bytes(size: (u32, u32), groups: usize, lobes: bool) -> u64 {
-    let pixels = pixels(size);
     // The parts by effect and by lobe, and for each light group its part and its caustics.
     let lobes = if lobes { film::lobe_names().count() } else { 0 };
-    let parts = (film::part_names().count() + lobes + 2 * groups) as u64;
-    FINISH_BYTES + pixels * (BYTES_PER_PIXEL + parts * BYTES_PER_PIXEL_OF_PART) + scratch(pixels)
+    finish::bytes(pixels(size), (film::part_names().count() + lobes + 2 * groups) as u64)
+}
+
+/// Checks that there is memory to merge the shards of a render, and to finish its picture if it `finishes`.
+///
+/// # Errors
+/// There is not.
+pub(super) fn check_merge(part: &ShardResult, shape: &Shape, finishes: bool) -> Result<()> {
+    let (width, height) = part.size;
+    let (groups, levels) = (shape.groups.len(), part.settings.levels.count);
+    let pixel = PixelAccumulator::bytes(levels, groups, shape.lobes) + layers::channels(shape) * size_of::<f32>();
+    let finish = if finishes { finish_bytes(part.size, groups, shape.lobes) } else { 0 };
+    let needed = pixels(part.size) * pixel as u64 + finish;
+    let outcome = memory::require(needed, format_args!("the sums and layers of {width} x {height} pixels"));
+    outcome.map_err(|error| error.hint("merge where more memory is free, or with --no-finish"))
 }
 
 /// A limit on the memory of photons, pixels and layers, set by the user.
@@ -150,23 +184,33 @@ impl MemoryLimit {
         if whole <= self.bytes {
             return Ok((settings, None));
         }
-        let mib = self.bytes >> 20;
+        let (fitted, less) = self.shrink(extent, &settings).map_err(|least| self.refuse(extent.film, method, least))?;
+        Ok((fitted, Some(format!("--memory {}: {less}", self.bytes >> 20))))
+    }
+
+    /// Settings with as many photons as the limit has room for, and words that say so.
+    ///
+    /// # Errors
+    /// The bytes that the render needs at least, which are more than the limit.
+    fn shrink(self, extent: Extent, settings: &Settings) -> std::result::Result<(Settings, String), u64> {
+        if !settings.method.takes_photon_count() {
+            return Err(extent.bytes(settings));
+        }
         let pixels = extent.bytes(&Settings { photons: 0, ..settings.clone() });
         let left = self.bytes.saturating_sub(pixels);
         let bytes_per_light_path = extent.photons_per_path * PHOTON_BYTES as f64;
         let least = (f64::from(MIN_PHOTONS) * bytes_per_light_path) as u64;
-        if !settings.method.takes_photon_count() || left < least {
-            let least = if settings.method.takes_photon_count() { pixels + least } else { whole };
-            return Err(self.refuse(extent.film, method, least));
+        if left < least {
+            return Err(pixels + least);
         }
         if settings.method.has_one_map() {
             let all = settings.photon_memory >> 20;
-            let warning = format!("--memory {mib}: the photon map has room for {} MiB instead of {all}", left >> 20);
-            return Ok((Settings { photon_memory: left, ..settings }, Some(warning)));
+            let less = format!("the photon map has room for {} MiB instead of {all}", left >> 20);
+            return Ok((Settings { photon_memory: left, ..settings.clone() }, less));
         }
         let photons = (left as f64 / bytes_per_light_path) as u32;
-        let warning = format!("--memory {mib}: {photons} light paths an iteration instead of {}", settings.photons);
-        Ok((Settings { photons, ..settings }, Some(warning)))
+        let less = format!("{photons} light paths an iteration instead of {}", settings.photons);
+        Ok((Settings { photons, ..settings.clone() }, less))
     }
 
     /// Makes the error of a render that needs at least `least` bytes, more than the limit.
@@ -206,11 +250,39 @@ impl MemoryCheck<'_> {
             None => (settings, None),
         };
         let finish = if self.finishes { finish_bytes(extent.film, extent.groups, extent.lobes) } else { 0 };
-        let needed = extent.bytes(&settings) + finish;
+        let free = memory::available().map_or(u64::MAX, |available| available.bytes).saturating_sub(finish);
+        let (settings, warning) = if extent.bytes(&settings) <= free {
+            (settings, warning)
+        } else {
+            let room = MemoryLimit { bytes: (FREE_SHARE * free as f64) as u64 };
+            match room.shrink(extent, &settings) {
+                Ok((settings, less)) => (settings, Some(format!("memory is short: {less}{}", extent.long_paths()))),
+                Err(_) => (settings, warning),
+            }
+        };
         let (paths, remedy) = self.describe(&settings);
         let (width, height) = extent.film;
-        require(needed, format_args!("{width} x {height} pixels{paths}"), remedy)?;
+        let remedy = format!("{remedy}{}", extent.long_paths());
+        require(extent.bytes(&settings) + finish, format_args!("{width} x {height} pixels{paths}"), &remedy)?;
         Ok((settings, warning))
+    }
+
+    /// Tells which settings fit into memory, without fewer light paths unless their number is an option.
+    pub fn admits(self) -> impl Fn(&Settings) -> bool {
+        let free = memory::available().map_or(u64::MAX, |available| available.bytes);
+        let photons_per_path = OnceCell::new();
+        move |settings| {
+            if settings.method.takes_photon_count() {
+                return true;
+            }
+            let MemoryCheck { view: View { scene, camera }, finishes, limit, .. } = self;
+            let photons_per_path = *photons_per_path.get_or_init(|| mean_photons(scene, camera, settings));
+            let channels = layers::channels(&layer_shape(settings, scene));
+            let extent = Extent::with_photons(self.view, settings, channels, photons_per_path);
+            let finish = if finishes { finish_bytes(extent.film, extent.groups, extent.lobes) } else { 0 };
+            let bytes = extent.bytes(settings);
+            bytes.saturating_add(finish) <= free && limit.is_none_or(|limit| bytes <= limit.bytes)
+        }
     }
 
     /// Names, for messages, the light paths or the method of a render, and how it takes less memory.
@@ -253,11 +325,11 @@ mod tests {
 
     #[test]
     fn a_finish_needs_memory_for_its_pixels_and_parts() {
-        let [small, large] = [(320, 180), (1920, 1080)].map(|size| finish_bytes(size, 0, false) - FINISH_BYTES);
+        let [small, large] = [(320, 180), (1920, 1080)].map(|size| finish_bytes(size, 0, false) - finish::bytes(0, 0));
         assert!(large > 20 * small && large < 36 * small, "{small} {large}");
         assert_eq!(
             finish_bytes((320, 180), 3, false),
-            finish_bytes((320, 180), 0, false) + 320 * 180 * 6 * BYTES_PER_PIXEL_OF_PART
+            finish_bytes((320, 180), 0, false) + 320 * 180 * 6 * finish::BYTES_PER_PIXEL_OF_PART
         );
         assert!(finish_bytes((1 << 16, 1 << 16), 1000, true) > 1 << 40);
     }

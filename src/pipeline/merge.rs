@@ -5,6 +5,7 @@ use super::deliver::{Contents, Delivery, deliver};
 use super::facts::SceneFacts;
 use super::finish::{self, FinishRequest};
 use super::layers;
+use super::memory;
 use super::shard::ShardFile;
 use crate::error::{Error, ErrorKind, Result};
 use crate::estimator::PixelAccumulator;
@@ -137,7 +138,9 @@ impl Shards {
         layers::check(&request.layers, &facts.shape, request.finish.is_some(), facts.motion.is_some())?;
         let levels = Some(part.settings.levels.count);
         let mut finish = request.finish.as_ref().map(|wanted| finish::open(wanted, levels)).transpose()?;
-        let mut pixels: Vec<PixelAccumulator> = Vec::new();
+        memory::check_merge(&part, &facts.shape, finish.is_some())?;
+        let (width, height) = part.size;
+        let mut pixels: Vec<PixelAccumulator> = crate::memory::reserve(width as usize * height as usize, "pixels")?;
         for (path, file) in &mut files {
             observe(MergeEvent::Reading(path));
             add_pixels(path, file, &mut pixels)?;

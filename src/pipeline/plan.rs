@@ -72,7 +72,8 @@ pub fn plan_picture(
     let Loaded { scene, removed, .. } = loaded;
     let checked = check_picture(&picture, path, scene)?;
     let view = View::new(scene, &checked.camera);
-    let chosen = choose(&mut picture.method, checked.settings, view, |_| true, stop);
+    let memory = MemoryCheck { view, method: "auto", finishes: true, limit: None };
+    let chosen = choose(&mut picture.method, checked.settings, view, memory.admits(), stop);
     let PictureRequest { max_depth, switches, .. } = picture;
     let mut plan = plan(PlanInput { chosen: &chosen, max_depth, switches }, view, removed);
     plan.warnings.splice(0..0, scene.warnings.iter().cloned());

@@ -9,6 +9,7 @@ use super::prepare::Prepared;
 use super::request::Request;
 use super::resume::Resumption;
 use super::saver::Saver;
+use super::slow_iteration;
 use crate::error::{Error, ErrorKind, Result};
 use crate::finish::reads_for_picture;
 use crate::image::atomic::is_same_file;
@@ -87,6 +88,9 @@ impl<'a> Running<'a> {
         }
         if session.iterations() == 0 && stop == StopReason::Interrupted {
             refuse_stop(observer)?;
+        }
+        if session.iterations() == 0 && stop == StopReason::Time {
+            return Err(slow_iteration::error(session.settings()));
         }
         let BetweenIterations { finish, saver, .. } = between;
         let obsolete_checkpoint = saver.and_then(|saver| saver.save_at_end(&session, stop, observer));

@@ -1,7 +1,9 @@
-//! A warning before a render whose time limit is too short for one iteration.
+//! A warning before a render whose time limit is too short for one iteration, and the error of one whose limit has
+//! passed.
 
 use crate::camera::Camera;
 use crate::choose::{pilot_settings, window_cost_ratio};
+use crate::error::Error;
 use crate::render::{RenderInput, Session, Settings};
 use crate::scene::View;
 
@@ -11,25 +13,43 @@ const MAX_PIXELS: f64 = 64.0 * 64.0;
 const MAX_SHARE: f64 = 1.0 / 64.0;
 /// Ratio of the estimated time of an iteration to the time limit above which a warning is given: the estimate is rough.
 const WARNING_RATIO: f64 = 1.25;
+/// Share of the time limit after which the timed iteration is abandoned.
+const MAX_TIMED_SHARE: f64 = 0.1;
 /// Shortest estimated iteration that a warning is given for (seconds).
 const MIN_SECONDS: f64 = 1.0;
 
 /// Returns a warning if one iteration is likely to take longer than the render may; `None` otherwise.
 pub(super) fn warning(view: View<'_>, settings: &Settings) -> Option<String> {
     let time = settings.time?;
-    let seconds = estimate_seconds(view, settings)?;
-    let remedy = match settings.method.takes_photon_count() {
-        true => "fewer --photons, a smaller --width or more --time",
-        false => "a smaller --width or more --time",
-    };
+    let seconds = estimate_seconds(view, settings, time)?;
+    let remedy = remedy(settings);
     (seconds > (WARNING_RATIO * time).max(MIN_SECONDS)).then(|| {
         format!("one iteration takes about {seconds:.0} s, longer than the {time:.0} s there are to render: the picture comes late and has one iteration (ask for {remedy})")
     })
 }
 
+/// Options that shorten an iteration.
+fn remedy(settings: &Settings) -> &'static str {
+    match settings.method {
+        method if method.takes_photon_count() => "fewer --photons, a smaller --width, --max-depth 64 or more --time",
+        method if method.takes_counts() => "fewer --light-paths, a smaller --width, --max-depth 64 or more --time",
+        _ => "a smaller --width, --max-depth 64 or more --time",
+    }
+}
+
+/// The error of a render that has stopped before the end of its first iteration.
+pub(super) fn error(settings: &Settings) -> Error {
+    let (limit, time) = (settings.first_iteration_limit().unwrap_or(0.0), settings.time.unwrap_or(0.0));
+    let name = settings.method.name();
+    let cause = format!(
+        "--time {time:.0}: the first iteration of --method {name} has not ended after {limit:.0} s, so there is no picture"
+    );
+    Error::usage(cause).hint(format!("use {}", remedy(settings)))
+}
+
 /// Seconds that an iteration takes, estimated by one iteration of a smaller picture with equal work per pixel. The
 /// smaller picture shows the whole film; a factor accounts for light paths outside the film.
-fn estimate_seconds(View { scene, camera }: View<'_>, settings: &Settings) -> Option<f64> {
+fn estimate_seconds(View { scene, camera }: View<'_>, settings: &Settings, time: f64) -> Option<f64> {
     let count = |(width, height): (u32, u32)| f64::from(width) * f64::from(height);
     let pixels = |camera: &Camera| count(camera.size());
     let walked = camera.sizes().map(count)[usize::from(settings.method.walks_whole_picture())];
@@ -40,5 +60,7 @@ fn estimate_seconds(View { scene, camera }: View<'_>, settings: &Settings) -> Op
     let stage = RenderInput::new(scene, &pilot, &settings);
     let mut session = Session::new(&stage);
     let before = session.spent().seconds;
-    session.step_within(None).then(|| factor * (session.spent().seconds - before) / share)
+    // An abandoned iteration takes longer than it was given.
+    session.step_within(Some(MAX_TIMED_SHARE * time));
+    (!settings.stop.requested()).then(|| factor * (session.spent().seconds - before) / share)
 }

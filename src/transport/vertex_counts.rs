@@ -17,7 +17,13 @@ use rayon::prelude::*;
 /// Number of paths of each kind (camera and light) that are traced to count vertices.
 const PATHS: u32 = 4096;
 /// Number of paths that a thread traces as one unit of work.
-const CHUNK: usize = 256;
+const CHUNK: usize = 16;
+/// Number of batches of paths. Each has paths of the whole picture.
+const BATCHES: u32 = 64;
+/// Number of vertices after which no further batch is traced. Closed white rooms have thousands of vertices per path.
+const MAX_VERTICES: u64 = 1 << 18;
+/// Number of camera vertices whose merges are counted if there are more than [`MAX_VERTICES`].
+const MERGING_VERTICES: u64 = 1 << 10;
 
 /// Mean numbers of vertices of a path in a scene, from which the costs of methods are estimated. "Full" paths continue
 /// by all lobes and collide in media; "short" paths end at broad lobes and cross media straight.
@@ -97,6 +103,11 @@ impl<const THROUGH: bool> Count<'_, THROUGH> {
         [self.all, self.to_broad, self.open.len() as u32, self.media, self.media_to_broad, self.textured].map(f64::from)
     }
 
+    /// Number of vertices on surfaces and in media.
+    fn vertices(&self) -> u64 {
+        u64::from(self.all) + u64::from(self.media)
+    }
+
     fn is_textured(&self, material: u32) -> bool {
         self.scene.materials.list[material as usize].textures().next().is_some()
     }
@@ -161,23 +172,24 @@ impl VertexCounts {
         };
         let from_camera = |index: u32| count_path::<false>(camera_paths, start(index), Transport::Radiance);
         let through = |index: u32| count_path::<true>(camera_paths, start(index), Transport::Radiance).counts();
-        let paths = || (0..PATHS).into_par_iter().with_min_len(CHUNK);
-        let light: Vec<Count<'_, false>> = paths().map(from_light).collect();
-        let through: Vec<[f64; 6]> =
-            if camera_paths.scene.survey.scattering { paths().map(through).collect() } else { Vec::new() };
-        let camera: Vec<Count<'_, false>> = paths().map(from_camera).collect();
+        let light = in_batches(from_light, Count::vertices);
+        let vertices = |counts: &[f64; 6]| (counts[0] + counts[3]) as u64;
+        let through = if camera_paths.scene.survey.scattering { in_batches(through, vertices) } else { Vec::new() };
+        let camera = in_batches(from_camera, Count::vertices);
         let map = PhotonMap::build(light.iter().flat_map(|count| &count.open).copied().collect());
         // Fewer paths than pixels: the same number of vertices is expected in a proportionally larger area.
-        let larger = pixels as f32 / PATHS as f32;
+        let larger = pixels as f32 / light.len() as f32;
+        let open = camera.iter().map(|count| count.open.len() as u64).sum::<u64>();
+        let step = if open > MAX_VERTICES { (open / MERGING_VERTICES) as usize } else { 1 };
         let merged = |count: &Count<'_, false>| {
             let (mut merged, radius2) = (0u64, reach(count.length).powi(2) * larger);
-            for open in &count.open {
+            for open in count.open.iter().step_by(step) {
                 map.within(open.p, radius2, |other, _| merged += u64::from(same_surface(other, open.ng)));
             }
             merged
         };
         let merged: Vec<u64> = camera.par_iter().with_min_len(CHUNK).map(merged).collect();
-        let merged = merged.iter().sum::<u64>() as f64 / f64::from(PATHS);
+        let merged = step as f64 * merged.iter().sum::<u64>() as f64 / camera.len() as f64;
         let [full, light] = [&camera, &light].map(|counts| mean(counts.iter().map(Count::counts)));
         let short = if through.is_empty() { full } else { mean(through.into_iter()) };
         VertexCounts::from_means(full, short, light, merged)
@@ -204,10 +216,26 @@ impl VertexCounts {
     }
 }
 
-/// Mean counts of [`PATHS`] paths. Counts are integers, so sums do not depend on their order.
-fn mean(counts: impl Iterator<Item = [f64; 6]>) -> [f64; 6] {
+/// Traces [`PATHS`] paths by `path`, or as many batches of them as have [`MAX_VERTICES`] `vertices`.
+fn in_batches<T: Send>(path: impl Fn(u32) -> T + Sync, vertices: impl Fn(&T) -> u64) -> Vec<T> {
+    let (mut all, mut counted) = (Vec::with_capacity(PATHS as usize), 0);
+    for batch in 0..BATCHES {
+        let indices = (0..PATHS / BATCHES).into_par_iter().with_min_len(CHUNK);
+        let traced: Vec<T> = indices.map(|index| path(BATCHES * index + batch)).collect();
+        counted += traced.iter().map(&vertices).sum::<u64>();
+        all.extend(traced);
+        if counted >= MAX_VERTICES {
+            break;
+        }
+    }
+    all
+}
+
+/// Mean counts of paths. Counts are integers, so sums do not depend on their order.
+fn mean(counts: impl ExactSizeIterator<Item = [f64; 6]>) -> [f64; 6] {
+    let paths = counts.len() as f64;
     let sum = counts.fold([0.0; 6], |sum, counts| std::array::from_fn(|k| sum[k] + counts[k]));
-    sum.map(|sum| sum / f64::from(PATHS))
+    sum.map(|sum| sum / paths)
 }
 
 /// Counts the vertices of one path; none without a start.

@@ -5,6 +5,7 @@ use caustique::image::exr;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 /// Runs the program under limits of the shell.
 fn limited(folder: &Folder, limits: &str, arguments: &str) -> Outcome {
@@ -65,6 +66,57 @@ fn renders_whose_announced_memory_fits_succeed() {
         let bound = announced / 3.0..=announced + taken;
         assert!(bound.contains(&used), "{method} {size}: {used} of {announced}");
     }
+}
+
+/// Writes a closed white box with a lamp and a camera inside, whose paths have thousands of segments.
+fn write_white_room(folder: &Folder) {
+    let corners = (0..8).flat_map(|corner| (0..3).map(move |axis| if corner >> axis & 1 == 1 { 1.0f32 } else { -1.0 }));
+    let triangles: [u16; 36] =
+        [0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5];
+    let mut bytes: Vec<u8> = corners.flat_map(f32::to_le_bytes).collect();
+    bytes.extend(triangles.into_iter().flat_map(u16::to_le_bytes));
+    std::fs::write(folder.path("room.bin"), bytes).expect("it can be written");
+    let room = json!({
+        "asset": {"version": "2.0"}, "scenes": [{"nodes": [0, 1, 2]}],
+        "nodes": [{"mesh": 0}, {"camera": 0, "translation": [0, 0, 0.9]},
+            {"translation": [0, 0.5, 0], "extensions": {"KHR_lights_punctual": {"light": 0}}}],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 1, "znear": 0.01}}],
+        "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_specular"],
+        "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 10}]}},
+        "buffers": [{"uri": "room.bin", "byteLength": 168}],
+        "bufferViews": [{"buffer": 0, "byteLength": 96}, {"buffer": 0, "byteOffset": 96, "byteLength": 72}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5123, "count": 36, "type": "SCALAR"}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}]}],
+        "materials": [{"doubleSided": true, "pbrMetallicRoughness": {"metallicFactor": 0},
+            "extensions": {"KHR_materials_specular": {"specularFactor": 0}}}],
+    });
+    std::fs::write(folder.path("room.gltf"), room.to_string()).expect("it can be written");
+}
+
+/// `auto` takes a method whose iterations are short and fit into memory. A named method whose first iteration would take
+/// hours, or whose photons fit into no memory, names the option that shortens light paths.
+#[test]
+fn closed_white_rooms_are_rendered_or_name_max_depth() {
+    let folder = Folder::new();
+    write_white_room(&folder);
+    let render = "render room.gltf -o out.exr --width 16 --height 9 --denoise none --progress none";
+    let start = Instant::now();
+    let auto = folder.run(&format!("{render} --time 1"));
+    assert_eq!(auto.code, Some(0), "{}", auto.stderr);
+    assert!(start.elapsed() < Duration::from_secs(30), "{:?}", start.elapsed());
+    assert!(folder.read("out.exr").1["iterations"].as_u64() > Some(1));
+    let vcm = folder.run(&format!("{render} --method vcm --time 1"));
+    assert_eq!(vcm.code, Some(2), "{}", vcm.stderr);
+    assert!(vcm.stderr.contains("has not ended after 8 s") && vcm.stderr.contains("--max-depth"), "{}", vcm.stderr);
+    let few = limited(&folder, "ulimit -v 3000000", &format!("{render} --method vcm --width 640 --height 360"));
+    assert_eq!(few.code, Some(1), "{}", few.stderr);
+    assert!(few.stderr.contains("need about") && few.stderr.contains("--max-depth"), "{}", few.stderr);
+    // Fewer light paths instead of an error.
+    let sppm = "--method sppm --max-depth 1000 --iterations 1 --threads 2";
+    let short = limited(&folder, "ulimit -v 1500000", &format!("{render} {sppm}"));
+    assert_eq!(short.code, Some(0), "{}", short.stderr);
+    assert!(short.stderr.contains("memory is short: ") && short.stderr.contains("--max-depth"), "{}", short.stderr);
 }
 
 /// The memory check counts a file once for each buffer that names it, and an image once for each texture.

@@ -46,6 +46,7 @@ impl<'a> Session<'a> {
     /// render.
     pub fn with_time_spent(input: &'a RenderInput<'a>, mut time: TimeSpent) -> Session<'a> {
         let RenderInput { scene, settings, initial_media, .. } = input;
+        settings.stop.start_iteration(settings.first_iteration_limit().map(|limit| limit - time.seconds));
         let (integrator, pixels) = time.measure(|| {
             let mut integrator = integrator(input);
             let pixels = integrator.pixels(input);

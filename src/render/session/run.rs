@@ -13,6 +13,11 @@ use crate::scene::Scene;
 /// variance.
 pub const MIN_ITERATIONS_FOR_ERROR: u64 = 2 * QUARTERS as u64;
 
+/// Times the limit [`Settings::time`] that the first iteration may take, because a picture needs one.
+const FIRST_ITERATION_FACTOR: f64 = 8.0;
+/// Smallest limit that [`FIRST_ITERATION_FACTOR`] applies to (seconds).
+const MIN_FIRST_LIMIT: f64 = 1.0;
+
 /// Renders a picture. `observe` is called after every iteration with the progress and the pixels, and may stop the render.
 ///
 /// Methods without bandwidth levels render one level. `settings.photons` applies to methods for which
@@ -40,8 +45,8 @@ pub fn run_session<'a>(
         if session.is_finished() {
             return StopReason::Iterations;
         }
-        // The first iteration may exceed the time limit, so that there is a picture.
-        let left = settings.time.filter(|_| session.iterations() > 0).map(|time| time - session.spent().seconds);
+        let limit = if session.iterations() > 0 { settings.time } else { settings.first_iteration_limit() };
+        let left = limit.map(|time| time - session.spent().seconds);
         if !session.step_within(left) {
             return if settings.stop.requested() || session.failure.is_some() {
                 StopReason::Interrupted
@@ -65,6 +70,12 @@ pub fn run_session<'a>(
 }
 
 impl Settings {
+    /// Seconds after which a render stops without a picture, because not even its first iteration has ended. `None`
+    /// without a limit of time.
+    pub fn first_iteration_limit(&self) -> Option<f64> {
+        self.time.map(|time| FIRST_ITERATION_FACTOR * time.max(MIN_FIRST_LIMIT))
+    }
+
     /// The reason to stop after `seconds` with the estimated relative error `error`; `None` to continue.
     fn stop_reason(&self, seconds: f64, error: Option<f64>) -> Option<StopReason> {
         if self.time.is_some_and(|t| seconds >= t) {
