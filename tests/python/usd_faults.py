@@ -123,7 +123,7 @@ class Faults(usd_support.Stages):
 
     def test_messages_are_short(self):
         """Whatever the length of a line that cannot be parsed, of the name of a prim, or of a value."""
-        long = 2_000_000 * "x"
+        long = 20_000 * "x"
         for text in (f'def "{long}', f"def Mesh {long}", prim("Cone", f'uniform token axis = "{long}"'),
                      f'def Sphere "{long}" {{\nfloat radius = nan\n}}', f"(\nmetersPerUnit = {long}\n)"):
             self.assertLess(len(self.outcome(text)), 2000)
