@@ -369,6 +369,27 @@ fn bulbs_of_spots_are_seen_and_count_once() {
     check("glass", &through, own * 3.0 / 3.25, 2e-3, 0.02);
 }
 
+/// Fog attenuates the light of a bulb from each of its points: a line of sight through the middle meets points of density
+/// `1 / (pi sqrt(r^2 - x^2))`, so the light of the middle is multiplied by the Bessel function I0(sigma r). Half of the
+/// bulb, in front of a black wall through its middle, sends half of I0 + L0 [modified Struve function].
+#[test]
+fn fog_attenuates_all_of_a_bulb() {
+    const SIGMA: f64 = 15.0;
+    let (bessel, struve) = (1.646_723_2, 1.216_162_5);
+    let at_middle = (-SIGMA * 0.55).exp() / (PI * 0.1f64.powi(2));
+    for (wall, expected) in [(false, at_middle * bessel), (true, at_middle * 0.5 * (bessel + struve))] {
+        let mut description = spot(true, false);
+        description.environment = None;
+        description.medium = Some(MediumParameters { sigma_a: Rgb::splat(SIGMA as f32), sigma_s: Rgb::ZERO, g: 0.0 });
+        if wall {
+            let wall = quad(Vec3::new(-1.0, 0.6, -1.0), Vec3::X * 2.0, Vec3::Z * 2.0);
+            add(&mut description, "wall", wall, matte(0.0, 0.0));
+        }
+        description.cameras.push(look_at(DVec3::new(0.0, 0.05, 0.0), DVec3::new(0.0, 0.6, 0.0), 0.1));
+        check(if wall { "half a bulb in fog" } else { "bulb in fog" }, &build(description), expected, 2e-3, 0.1);
+    }
+}
+
 /// All methods agree on a room that only the bulb of a spot lights, seen in a varnished floor.
 #[test]
 fn all_methods_agree_on_bulbs_of_spots() {

@@ -2,6 +2,7 @@
 
 use crate::support;
 
+use caustique::estimator::InitialBandwidth;
 use caustique::geometry::Mesh;
 use caustique::material::{Alpha, Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec3};
@@ -14,7 +15,7 @@ use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, P
 use caustique::scene::{Description, Scene, View};
 use caustique::transport::{CameraPaths, Indirect, InitialMedia, Interior, LightPaths};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, sphere, square};
-use support::stats::{mean_and_error, t_critical};
+use support::stats::{Check, mean_and_error, t_critical};
 
 /// Nested shells of two alternating glasses under a uniform sky.
 fn shells(count: u32) -> Scene {
@@ -101,6 +102,61 @@ fn rays_pass_or_enter_glass_with_alpha_as_a_whole() {
                 assert!((mean - expected).abs() < allowed, "{what} {alpha}, {method:?}: {mean} +- {error}, {expected}");
                 assert!(allowed < 0.03, "{what} {alpha}, {method:?}: {error} is too inaccurate for the test");
             }
+        }
+    }
+}
+
+/// A solid exists for the share alpha of the light, so white solids of any alpha that scatter, with and without a white
+/// ball inside, are invisible under a white sky: subpaths that are joined inside must agree whether the solid exists.
+/// Camera inside and outside. When both decided apart, light was lost: the means were 0.53 to 0.95.
+#[test]
+fn subpaths_agree_whether_a_solid_exists() {
+    let white = MediumParameters { sigma_a: Rgb::ZERO, sigma_s: Rgb::splat(2.0), g: 0.3 };
+    let partial = |alpha: f32, ior: f32, medium: Option<MediumParameters>| Material {
+        alpha: Alpha::Blend,
+        base_color: [1.0, 1.0, 1.0, alpha],
+        medium,
+        ..glass(ior)
+    };
+    let wax =
+        Material { transmission: 0.0, diffuse_transmission: 1.0, specular: 0.0, ..partial(0.5, 1.5, Some(white)) };
+    let fog = || partial(0.4, 1.0, Some(white));
+    let cases = [
+        ("fog", fog(), false, 4.0),
+        ("wax", wax, false, 4.0),
+        ("ball", fog(), true, 4.0),
+        ("inside", fog(), true, 0.9),
+    ];
+    for (what, solid, ball, eye) in cases {
+        let mut description = Description::default();
+        let source = EnvironmentSource::Color(Rgb::ONE);
+        description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
+        add(&mut description, "box", cuboid(Vec3::NEG_ONE, Vec3::ONE, false), solid.clone());
+        // A second solid around it, whose alpha is another decision.
+        let outer = Material { priority: -1, ..solid };
+        add(&mut description, "around", cuboid(Vec3::splat(-1.3), Vec3::splat(1.3), false), outer);
+        if ball {
+            add(&mut description, "ball", sphere(Vec3::ZERO, 0.5, 16), matte(1.0, 0.0));
+        }
+        description.cameras.push(look_at(DVec3::new(0.1, 0.2, eye), DVec3::ZERO, 30.0));
+        let scene = build(description);
+        for (method, detects) in [(Method::Path, 0.08), (Method::Bdpt, 0.15), (Method::Vcm, 0.15), (Method::Sppm, 0.25)]
+        {
+            let settings = |seed| Settings {
+                seed,
+                photons: 4000,
+                initial_bandwidth: InitialBandwidth::Fixed(0.1),
+                levels: Levels::new(1),
+                iterations: Some(64),
+                ..Settings::default()
+            };
+            let mean = |seed| {
+                let rendered = support::render(&scene, method, 8, &settings(seed));
+                rendered.pixels.iter().map(|p| p.mean(0).x).sum::<f64>() / rendered.pixels.len() as f64
+            };
+            let bias = if matches!(method, Method::Path | Method::Bdpt) { 1e-3 } else { 0.02 };
+            let check = Check { expected: 1.0, bias, detects };
+            check.run(16, &format!("{what}, {method:?}"), &(0..12).map(mean).collect::<Vec<f64>>());
         }
     }
 }

@@ -7,7 +7,7 @@
 use crate::support;
 
 use caustique::estimator::InitialBandwidth;
-use caustique::material::{Material, MediumGrids, MediumParameters};
+use caustique::material::{Alpha, Material, MediumGrids, MediumParameters};
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
 use caustique::medium::{DensityGrid, EmissionGrid, Grid};
 use caustique::random::HashSequence;
@@ -230,6 +230,82 @@ fn methods_agree_by_firelight() {
     agree("firelight, vcm", &vcm, &bdpt, 0.01, 0.15);
     let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(10_000, 0.06, 16, seed));
     agree("firelight, sppm", &sppm, &bdpt, 0.03, 0.3);
+}
+
+/// The irradiance at the origin of a floor from points that emit `emission` (W/sr/m3), in the box from `low` to `high`,
+/// without absorption: midpoints of 64 cells per edge.
+fn irradiance(low: DVec3, high: DVec3, emission: impl Fn(DVec3) -> f64) -> f64 {
+    const CELLS: i32 = 64;
+    let cell = (high - low) / f64::from(CELLS);
+    let middle = |i: i32| f64::from(i) + 0.5;
+    let mut sum = 0.0;
+    for (x, y, z) in (0..CELLS).flat_map(|x| (0..CELLS).flat_map(move |y| (0..CELLS).map(move |z| (x, y, z)))) {
+        let p = low + cell * DVec3::new(middle(x), middle(y), middle(z));
+        sum += emission(p) * p.y / p.length().powi(3);
+    }
+    sum * cell.element_product()
+}
+
+/// A fire lights from the places where cameras see it: not where a clear solid of higher priority takes its place, for a
+/// share alpha of the light if its mesh exists for that share, and alone where a larger fire of equal priority
+/// overlaps it. The part of its grid that is outside of its mesh does not burn. The integral over all of its places,
+/// for a floor below and for the view of the camera.
+#[test]
+fn fires_light_from_where_they_are_seen() {
+    let clear = coefficients([0.0; 3], [0.0; 3], 0.0);
+    let fire = |alpha: f32, emission: f32| Material {
+        alpha: Alpha::Blend,
+        base_color: [1.0, 1.0, 1.0, alpha],
+        ..burns(clear, grid(2, |_| 1.0), [emission; 3])
+    };
+    let within = |p: DVec3, centre: DVec3, half: f64| (p - centre).abs().max_element() < half;
+    let (centre, aside) = (DVec3::Y * 2.0, DVec3::new(0.25, 1.75, 0.25));
+    let place = |at: DVec3, half: f64| DAffine3::from_translation(at) * DAffine3::from_scale(DVec3::splat(half));
+    let inner = || cuboid(Vec3::splat(-0.5), Vec3::splat(0.5), false);
+    let scenes: [(&str, Option<(caustique::geometry::Mesh, Material, f64)>, f32); 5] = [
+        ("alone", None, 1.0),
+        ("alpha", None, 0.4),
+        ("displaced", Some((domain(), Material { priority: 1, ..glass(1.0) }, 0.0)), 1.0),
+        ("overlapping", Some((domain(), fire(1.0, 0.5), 0.5)), 1.0),
+        ("cut off", Some((inner(), fire(1.0, 3.0), 3.0)), 1.0),
+    ];
+    for (what, other, alpha) in scenes {
+        let mut description = Description::default();
+        let floor = quad(Vec3::new(-9.0, 0.0, -9.0), Vec3::Z * 18.0, Vec3::X * 18.0);
+        add(&mut description, "floor", floor, matte(0.5, 0.0));
+        add_at(&mut description, "fire", domain(), fire(alpha, 1.0), place(centre, 1.0));
+        let half = if what == "cut off" { 0.25 } else { 0.5 };
+        let inside = other.as_ref().map(|(.., emission)| *emission);
+        if let Some((mesh, material, _)) = other {
+            add_at(&mut description, "other", mesh, material, place(aside, 0.5));
+        }
+        let emission = |p: DVec3| match inside {
+            Some(emission) if within(p, aside, half) => emission,
+            _ => f64::from(alpha),
+        };
+        let lit = irradiance(centre - 1.0, centre + 1.0, emission) * 0.5 / std::f64::consts::PI;
+        let mut seen = description.clone();
+        description.cameras.push(look_at(DVec3::new(0.3, 0.5, 0.0), DVec3::ZERO, 0.5));
+        let through = DVec3::new(0.25, 6.0, 0.25);
+        seen.cameras.push(look_at(through, DVec3::new(0.25, 2.0, 0.25), 0.1));
+        seen.materials[0] = Material { name: "floor".into(), ..matte(0.0, 0.0) };
+        let of_inside = inside.map_or(0.0, |emission| 2.0 * half * (emission - 1.0));
+        for (view, description, expected) in
+            [("floor", description, lit), ("view", seen, (2.0 + of_inside) * f64::from(alpha))]
+        {
+            let scene = build(description);
+            for method in [Method::Path, Method::Bdpt, Method::Vcm, Method::Sppm, Method::Light] {
+                if method == Method::Light && view == "floor" {
+                    continue;
+                }
+                let one = |seed| {
+                    render(&scene, method, 4, &Settings { levels: Levels::new(1), ..photons(200, 0.05, 120, seed) })
+                };
+                let rendered: Vec<Rendered> = (0..8).map(one).collect();
+                check_means(&format!("fire {what}, {view}, {method:?}"), &rendered, [expected; 3], 2e-3, 0.2);
+            }
+        }
+    }
 }
 
 /// The other methods that render heterogeneous media.
