@@ -12,6 +12,8 @@ use std::f64::consts::{PI, TAU};
 
 /// Radius of the empty space around a camera.
 const CAMERA_SPACE: f64 = 0.08;
+/// First seed of scenes with fires, alpha of solids and dark lights. Tests name scenes of earlier seeds for what they show.
+const FIRST_WITH_ADDITIONS: u64 = 2000;
 /// Number of attempts to find a place for a thing.
 const ATTEMPTS: usize = 40;
 
@@ -38,6 +40,9 @@ pub fn generate(seed: u64) -> World {
     generator.cameras();
     generator.lights();
     generator.things();
+    if seed >= FIRST_WITH_ADDITIONS {
+        generator.additions(seed);
+    }
     generator.placed()
 }
 
@@ -374,6 +379,59 @@ impl Generator {
         let chain = self.nested(Placement { translation: p, rotation, scale: radius * stretch });
         let matter = self.matter();
         self.world.add("floating", mesh, matter, chain);
+    }
+
+    /// Adds fires, alpha of solids, and lights that are dark, by random numbers of their own.
+    fn additions(&mut self, seed: u64) {
+        let others = std::mem::replace(&mut self.random, Random::new(seed ^ 0xa1fa));
+        if self.random.chance(0.15) {
+            self.fires();
+        }
+        if self.random.chance(0.25) {
+            for matter in
+                self.world.materials.iter_mut().filter(|m| m.is_glass() && m.solid && m.emission == DVec3::ZERO)
+            {
+                if self.random.chance(0.6) {
+                    matter.alpha = self.random.within(0.1, 0.9);
+                }
+            }
+        }
+        if self.random.chance(0.25) {
+            for _ in 0..1 + self.random.below(3) {
+                let p = self.room * self.random.vector(-0.9, 0.9);
+                let radius = if self.random.chance(0.5) { 0.0 } else { 0.01 };
+                let kind = match self.random.below(2) {
+                    0 => LightKind::Point { radius },
+                    _ => LightKind::Spot { inner: 0.2, outer: 0.7, radius },
+                };
+                let dark = Light { kind, color: DVec3::ZERO };
+                self.world.add_kind("dark", ThingKind::Light(dark), vec![Placement::at(p.abs())]);
+            }
+        }
+        self.random = others;
+    }
+
+    /// Adds one or two fires, the second of which overlaps the first, and a clear solid that may displace both.
+    fn fires(&mut self) {
+        let radius = self.random.within(0.05, 0.15);
+        let Some(p) = self.free(radius, None) else { return };
+        let rotation = self.random.turn();
+        for _ in 0..1 + self.random.below(2) {
+            let offset = self.random.vector(-0.3, 0.3) * radius;
+            let scale = DVec3::splat(radius * self.random.within(0.4, 0.8));
+            let chain = self.nested(Placement { translation: p + offset, rotation, scale });
+            let (medium, fire) = (self.medium(), self.color(0.2, 1.0) / radius);
+            let matter = Matter { medium: Some(medium), fire: Some(fire), ..Matter::glass(1.0, 0.0) };
+            self.world.add("fire", cuboid(DVec3::splat(-0.57), DVec3::splat(0.57), false), matter, chain);
+        }
+        if self.random.chance(0.5) {
+            let offset = self.random.vector(-0.3, 0.3) * radius;
+            let scale = DVec3::splat(0.3 * radius);
+            let place = Placement { translation: p + offset, rotation, scale };
+            let priority = self.random.below(3) as i32 - 1;
+            let matter = Matter { priority, ..Matter::glass(if self.random.chance(0.5) { 1.0 } else { 1.4 }, 0.0) };
+            self.world.add("displacing", sphere(12, true), matter, vec![place]);
+        }
     }
 
     /// Scales, rotates and moves the whole scene.

@@ -37,7 +37,7 @@ struct Options {
     #[arg(long, default_value_t = 4.0)]
     hours: f64,
     /// The first seed, if the folder has no state.
-    #[arg(long, default_value_t = 1000)]
+    #[arg(long, default_value_t = 2000)]
     seed: u64,
     /// Folder of the state and of failing scenes.
     #[arg(long, default_value = "out/random")]

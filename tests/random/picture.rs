@@ -4,6 +4,9 @@ use super::usd;
 use super::world::World;
 use super::write::glb;
 use crate::support::stats::mean_and_error;
+use caustique::material::{Material, MediumGrids};
+use caustique::math::Vec3;
+use caustique::medium::{DensityGrid, EmissionGrid, Grid};
 use caustique::plan::switch::Removed;
 use caustique::plan::{Effect, EffectPlan, Plan, PlanRequest, Switches};
 use caustique::render::{Control, Levels, Method, Rendered, Settings, render};
@@ -11,6 +14,7 @@ use caustique::scene::gltf::{self, ReadOptions};
 use caustique::scene::{CameraRequest, Crop, Description, Scene};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Side of a picture (pixels).
 pub const SIZE: u32 = 24;
@@ -96,7 +100,24 @@ impl Shot {
 /// The reader refuses the file.
 pub fn read(world: &World) -> Result<Scene, String> {
     let description = gltf::read_bytes(&glb(world), Path::new("random.glb"), &ReadOptions::default());
-    build(description.map_err(|error| error.to_string())?)
+    let mut description = description.map_err(|error| error.to_string())?;
+    add_fires(world, &mut description);
+    build(description)
+}
+
+/// Gives media their grids, which a file of its own would hold.
+fn add_fires(world: &World, description: &mut Description) {
+    let grid = || Grid::new([2; 3], 1, [Vec3::splat(-0.5), Vec3::splat(0.5)], vec![1.0; 8]);
+    for thing in &world.things {
+        let Some(fire) = world.matter(thing).and_then(|matter| matter.fire) else { continue };
+        let Some(placed) = description.instances.iter_mut().find(|placed| placed.name == thing.name) else { continue };
+        let density = DensityGrid::new(grid().expect("it is valid")).expect("it has one channel");
+        let emission = EmissionGrid::new(grid().expect("it is valid"), fire.as_vec3());
+        let material = description.materials[placed.material as usize].clone();
+        let grids = Some(Arc::new(MediumGrids { density, emission }));
+        placed.material = description.materials.len() as u32;
+        description.materials.push(Material { grids, ..material });
+    }
 }
 
 fn build(description: Description) -> Result<Scene, String> {

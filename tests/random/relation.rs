@@ -218,6 +218,7 @@ pub fn similar(world: &World, scale: f64, rotation: DQuat, translation: DVec3) -
     made.fog = made.fog.map(|fog| fog.scaled(scale));
     for matter in &mut made.materials {
         matter.medium = matter.medium.map(|medium| medium.scaled(scale));
+        matter.fire = matter.fire.map(|fire| fire / scale);
     }
     for thing in &mut made.things {
         thing.chain.insert(0, parent);
@@ -272,6 +273,14 @@ fn copied(world: &World) -> World {
     let mut made = World { meshes: vec![], ..world.clone() };
     for thing in &mut made.things {
         let to_world = thing.to_world();
+        // The box of a fire lies in the space of its mesh.
+        if world.matter(thing).is_some_and(|matter| matter.fire.is_some()) {
+            if let ThingKind::Mesh { mesh, .. } = &mut thing.kind {
+                made.meshes.push(world.meshes[*mesh].clone());
+                *mesh = made.meshes.len() - 1;
+            }
+            continue;
+        }
         if let ThingKind::Mesh { mesh, .. } = &mut thing.kind {
             made.meshes.push(world.meshes[*mesh].transformed(&to_world));
             *mesh = made.meshes.len() - 1;
@@ -358,7 +367,8 @@ const FAINT: f64 = 1e-9;
 pub fn switch_off(world: &mut World, index: usize) {
     match world.things[index].kind {
         ThingKind::Mesh { mesh, material } => {
-            let off = Matter { emission: DVec3::ZERO, ..world.materials[material].clone() };
+            let fire = world.materials[material].fire.map(|_| DVec3::ZERO);
+            let off = Matter { emission: DVec3::ZERO, fire, ..world.materials[material].clone() };
             world.materials.push(off);
             world.things[index].kind = ThingKind::Mesh { mesh, material: world.materials.len() - 1 };
         }
@@ -374,7 +384,10 @@ pub fn switch_off(world: &mut World, index: usize) {
 pub fn brighter(world: &World, factor: DVec3) -> World {
     let mut made = world.clone();
     made.sky = made.sky.map(|sky| sky * factor);
-    made.materials.iter_mut().for_each(|matter| matter.emission *= factor);
+    for matter in &mut made.materials {
+        matter.emission *= factor;
+        matter.fire = matter.fire.map(|fire| fire * factor);
+    }
     for thing in &mut made.things {
         if let ThingKind::Light(light) = &mut thing.kind {
             light.color *= factor;
@@ -396,6 +409,7 @@ fn permuted(world: &World) -> World {
     for matter in &mut made.materials {
         turn(&mut matter.base);
         turn(&mut matter.emission);
+        matter.fire.iter_mut().for_each(turn);
     }
     for thing in &mut made.things {
         if let ThingKind::Light(light) = &mut thing.kind {

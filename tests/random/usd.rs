@@ -13,7 +13,17 @@ pub fn reduced(world: &World) -> World {
     for matter in &mut made.materials {
         let specular = if matter.specular > 0.0 { 1.0 } else { 0.0 };
         let ior = if matter.is_glass() { matter.ior } else { 1.5 };
-        *matter = Matter { medium: None, texture: None, bumps: None, priority: 0, specular, ior, ..matter.clone() };
+        *matter = Matter {
+            medium: None,
+            fire: None,
+            alpha: 1.0,
+            texture: None,
+            bumps: None,
+            priority: 0,
+            specular,
+            ior,
+            ..matter.clone()
+        };
     }
     for thing in &mut made.things {
         match &mut thing.kind {

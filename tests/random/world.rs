@@ -120,12 +120,23 @@ pub struct Matter {
     pub ior: f64,
     pub emission: DVec3,
     pub medium: Option<Medium>,
+    /// Emission of the medium within the box from -0.5 to 0.5 of the mesh (W/sr/m3), where it also absorbs and scatters;
+    /// `None` if the medium fills the mesh and does not emit.
+    #[serde(default)]
+    pub fire: Option<DVec3>,
     pub priority: i32,
+    /// Share of the light that the surface or solid exists for.
+    #[serde(default = "one")]
+    pub alpha: f64,
     /// Texture of the base colour.
     pub texture: Option<usize>,
     /// Strength and texture of a normal map.
     pub bumps: Option<(f64, usize)>,
     pub clearcoat: f64,
+}
+
+fn one() -> f64 {
+    1.0
 }
 
 /// Row-major texels of 8 bits.
@@ -149,7 +160,9 @@ impl Default for Matter {
             ior: 1.5,
             emission: DVec3::ZERO,
             medium: None,
+            fire: None,
             priority: 0,
+            alpha: 1.0,
             texture: None,
             bumps: None,
             clearcoat: 0.0,
@@ -178,7 +191,7 @@ impl Matter {
     }
 
     pub fn glows(&self) -> bool {
-        self.emission.max_element() > 0.0
+        self.emission.max_element() > 0.0 || self.fire.is_some_and(|fire| fire.max_element() > 0.0)
     }
 }
 
@@ -320,7 +333,7 @@ impl World {
     pub fn lights(&self) -> Vec<usize> {
         let shines = |thing: &Thing| match thing.kind {
             ThingKind::Mesh { .. } => self.matter(thing).is_some_and(Matter::glows),
-            ThingKind::Light(_) => true,
+            ThingKind::Light(light) => light.color.max_element() > 0.0,
             ThingKind::Camera(_) => false,
         };
         (0..self.things.len()).filter(|i| shines(&self.things[*i])).collect()

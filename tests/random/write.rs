@@ -219,7 +219,7 @@ fn material(matter: &Matter) -> Value {
     }
     let mut material = json!({
         "pbrMetallicRoughness": {
-            "baseColorFactor": matter.base.extend(1.0),
+            "baseColorFactor": matter.base.extend(matter.alpha),
             "metallicFactor": matter.metallic,
             "roughnessFactor": matter.roughness,
         },
@@ -228,6 +228,9 @@ fn material(matter: &Matter) -> Value {
         "extensions": extensions,
         "extras": {"caustique": extras},
     });
+    if matter.alpha < 1.0 {
+        material["alphaMode"] = "BLEND".into();
+    }
     if let Some(texture) = matter.texture {
         material["pbrMetallicRoughness"]["baseColorTexture"] = json!({"index": texture});
     }
