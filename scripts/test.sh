@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Installs missing dependencies and runs the tests. Stops at the first failing part, then prints the slowest tests and a
-# summary; the last line counts the tests: "123 passed, 0 failed". A part that fails without a failed test (formatting,
-# a lint, a build) counts as one.
+# Installs missing dependencies and runs all tests, then prints the slowest tests and a summary; the last line counts the
+# tests: "123 passed, 0 failed". A part that fails hides no part after it, except those that need what it builds. A part
+# that fails without a failed test (formatting, a lint, a build) counts as one.
 #
 #   scripts/test.sh                     the tests that every change must pass
 #   scripts/test.sh --long              everything: also the tests marked long, and the hard cases by all methods
@@ -52,7 +52,7 @@ finish() {
 trap finish EXIT
 trap 'exit 130' INT TERM
 
-# part NAME COMMAND...: runs the command, shows its output, and adds its tests to the counts
+# part NAME COMMAND...: runs the command, shows its output, and adds its tests to the counts. Sets verdict to ok or FAILED.
 part() {
     local name=$1 start=$SECONDS status=0 log good bad skipped
     shift
@@ -69,20 +69,18 @@ part() {
     [ "$status" -eq 0 ] || [ "$bad" -gt 0 ] || bad=1
     passed=$((passed + good))
     failed=$((failed + bad))
-    local verdict=ok
+    verdict=ok
     [ "$bad" -eq 0 ] || verdict=FAILED
     summary+=("$(printf '%-8s %-22s %4d passed, %d failed, %d s' "$verdict" "$name" "$good" "$bad" $((SECONDS - start)))")
-    [ "$bad" -eq 0 ] || exit 1
 }
 
 # tests PART COMMAND...: a part that must run at least one test
 tests() {
     local before=$passed name=$1
     part "$@"
-    if [ "$passed" -eq "$before" ]; then
+    if [ "$passed" -eq "$before" ] && [ "$verdict" = ok ]; then
         summary+=("FAILED   $name: no test ran")
         failed=$((failed + 1))
-        exit 1
     fi
 }
 
@@ -108,7 +106,10 @@ join_beside() {
     cat "$WORK/beside_output"
     # shellcheck source=/dev/null
     . "$WORK/beside_result"
-    [ "$status" -eq 0 ] || exit 1
+    if [ "$status" -ne 0 ]; then
+        summary+=("FAILED   the parts beside: they ended before all had run")
+        failed=$((failed + 1))
+    fi
 }
 
 without() { summary+=("$(printf '%-8s %-22s %s' 'not run' "$1" "$2")"); }
@@ -124,6 +125,10 @@ else
     without 'cargo fmt' 'rustfmt is not installed: rustup component add rustfmt'
 fi
 part 'cargo build' cargo build --locked --release --workspace
+if [ "$verdict" != ok ]; then
+    without 'all other parts' 'they need the build'
+    exit 1
+fi
 # other_blenders [VARIABLE=VALUE]: the exporter in the oldest and the newest Blender
 other_blenders() {
     local which python
@@ -148,7 +153,11 @@ program_tests() {
     fi
     tests 'Hard cases' tests/hard-cases.sh ${hard_cases[@]+"${hard_cases[@]}"}
     part 'Python wheel' scripts/python.sh
-    tests 'Python package' .venv-python/bin/python -W error::DeprecationWarning tests/python/timed.py discover -s tests/python/package
+    if [ "$verdict" = ok ]; then
+        tests 'Python package' .venv-python/bin/python -W error::DeprecationWarning tests/python/timed.py discover -s tests/python/package
+    else
+        without 'Python package' 'it needs the wheel'
+    fi
 }
 run_beside program_tests
 if cargo clippy --version >/dev/null 2>&1; then

@@ -72,6 +72,54 @@ class Counts(unittest.TestCase):
         self.assertEqual(counts("Ran 0 tests in 0.0s\n\nNO TESTS RAN\n"), (0, 0, 0))
 
 
+#: Runs nothing: reports a passed test, or fails.
+STUB = """#!/bin/sh
+case "$0 $*" in *"$FAILING"*) exit 1 ;; esac
+echo "test result: ok. 1 passed; 0 failed; 0 ignored; 0 measured; 0 filtered out; finished in 0.01s"
+"""
+
+
+class Parts(support.Scratch):
+    """Runs scripts/test.sh with stubs of all programs, of which one fails."""
+
+    def summary(self, failing):
+        """Exit code, and the verdict of each part by its name."""
+        folder = self.dir
+        for name in ("scripts/test.sh", "tests/test_counts.awk", "tests/test_times.awk"):
+            (folder / name).parent.mkdir(exist_ok=True)
+            shutil.copy(support.ROOT / name, folder / name)
+        (folder / "scripts/setup.sh").write_text("ROOT=$PWD\nsetup() { :; }\n")
+        pythons = [f".venv{which}/bin/python" for which in ("", "-bpy", "-usd", "-python")]
+        for name in ("bin/cargo", "bin/rustc", "scripts/python.sh", "tests/hard-cases.sh", *pythons):
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_text(STUB)
+            (folder / name).chmod(0o755)
+        known = {**os.environ, "FAILING": failing, "PATH": f"{folder / 'bin'}:{os.environ['PATH']}"}
+        done = subprocess.run(["scripts/test.sh"], cwd=folder, env=known, capture_output=True, text=True, check=False)
+        lines = re.findall(r"^(ok|FAILED|not run) +(.*?)(?:  +|$)", done.stdout, re.MULTILINE)
+        return done.returncode, {name: verdict for verdict, name in lines}, done.stdout.splitlines()[-1]
+
+    def test_all_parts_pass(self):
+        code, verdicts, last = self.summary("nothing")
+        self.assertEqual((code, last), (0, f"{list(verdicts.values()).count('ok')} passed, 0 failed"))
+
+    def test_a_failing_part_hides_no_other(self):
+        for failing, part in [("clippy --locked", "cargo clippy"), ("usd_", "Python with USD"), ("--lib", "cargo test")]:
+            code, verdicts, last = self.summary(failing)
+            self.assertEqual(code, 1, failing)
+            self.assertRegex(last, r"\d passed, 1 failed")
+            self.assertEqual(verdicts.pop(part), "FAILED")
+            for name in ("cargo fmt", "cargo doc", "Python", "Hard cases", "Python package"):
+                self.assertEqual(verdicts[name], "ok", failing)
+
+    def test_parts_that_need_a_failed_one_do_not_run(self):
+        code, verdicts, _ = self.summary("python.sh")
+        self.assertEqual((code, verdicts["Python wheel"], verdicts["Python package"]), (1, "FAILED", "not run"))
+        code, verdicts, last = self.summary("cargo build")
+        self.assertEqual((code, last), (1, "1 passed, 1 failed"))
+        self.assertEqual((verdicts["all other parts"], len(verdicts)), ("not run", 3))
+
+
 class Blender(unittest.TestCase):
     def test_without_bpy_the_remedy_is_printed(self):
         for name in ("compositor", "export"):
