@@ -11,6 +11,10 @@ from mathutils import Matrix
 import export_guard as guard
 
 _TONEMAPS = {"AgX": "agx", "Filmic": "filmic", "Khronos PBR Neutral": "neutral", "Standard": "srgb"}
+# Names of looks, without the prefix of their view transform.
+_CONTRASTS = {"None": None, "": None, "Very High Contrast": "very-high", "High Contrast": "high",
+              "Medium High Contrast": "medium-high", "Medium Contrast": "medium", "Base Contrast": "medium",
+              "Medium Low Contrast": "medium-low", "Low Contrast": "low", "Very Low Contrast": "very-low"}
 # Rays along each side of the picture that search for clipped objects.
 _GRID = 16
 
@@ -99,7 +103,7 @@ def warn_of_clipping(thing, flat, warn):
 
 def picture(scene, warn):
     """Keys of the scene: `resolution` (pixels), `crop` (x, y from the top left, width, height, as shares of the
-    picture), `exposure` (stops), `tonemap`, `film_transparent`, `frame` and `frame_rate` (numerator, denominator)."""
+    picture), `exposure` (stops), `tonemap`, `contrast`, `film_transparent`, `frame` and `frame_rate` (numerator, denominator)."""
     render, view, where = scene.render, scene.view_settings, f'scene "{scene.name}"'
     share = render.resolution_percentage / 100
     said = {"resolution": [max(round(n * share), 1) for n in (render.resolution_x, render.resolution_y)]}
@@ -122,8 +126,13 @@ def picture(scene, warn):
         said["tonemap"] = _TONEMAPS[view.view_transform]
     else:
         warn(where, f'its view transform "{view.view_transform}" is not carried: the PNG is made with agx')
-    if view.look not in {"None", ""} or view.gamma != 1 or view.use_curve_mapping:
-        warn(where, "look, gamma and curves of its colour management are not carried: they concern the PNG alone")
+    look = view.look.removeprefix(f"{view.view_transform} - ")
+    if look not in _CONTRASTS or (_CONTRASTS[look] and said.get("tonemap") not in {"agx", "filmic"}):
+        warn(where, f'its look "{view.look}" is not carried: it concerns the PNG alone')
+    elif _CONTRASTS[look]:
+        said["contrast"] = _CONTRASTS[look]
+    if view.gamma != 1 or view.use_curve_mapping:
+        warn(where, "gamma and curves of its colour management are not carried: they concern the PNG alone")
     # Through decimals, because Blender stores 1.001 in single precision.
     rate = fractions.Fraction(f"{render.fps:.6g}") / fractions.Fraction(f"{render.fps_base:.6g}")
     if rate > 0:

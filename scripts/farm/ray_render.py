@@ -29,7 +29,7 @@ HERE = Path(__file__).resolve().parent
 # Options that the farm sets itself, or that have no meaning for a shard.
 RESERVED = ("--shard", "--resume", "--checkpoint", "--threads")
 # Options of a merge, because no shard is a picture.
-MERGE_OPTIONS = ("--png", "--exposure", "--tonemap", "--preview", "--layers")
+MERGE_OPTIONS = ("--png", "--exposure", "--tonemap", "--contrast", "--preview", "--layers")
 
 
 class Refused(Exception):

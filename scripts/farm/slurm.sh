@@ -33,7 +33,7 @@ while [ $# -gt 0 ]; do
     --dry-run) dry=1 ;;
     --) merge=("${@:2}") && break ;;
     --shard | --resume | --checkpoint | --threads) fail "$1 is given by the farm" 'see the head of this script' ;;
-    --png | --exposure | --tonemap | --preview | --layers) fail "$1: no shard is a picture" "give what the merge is to do behind --" ;;
+    --png | --exposure | --tonemap | --contrast | --preview | --layers) fail "$1: no shard is a picture" "give what the merge is to do behind --" ;;
     *) if [ -z "$scene" ] && [[ $1 != -* ]]; then scene=$1; else render+=("$1"); fi ;;
     esac
     shift

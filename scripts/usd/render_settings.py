@@ -11,7 +11,7 @@ from faults import Fault
 from stage import custom_keys
 
 # Keys of the scene's `extras.caustique`. All other `caustique:` attributes of the settings are options of `render`.
-SCENE_KEYS = {"environment", "medium", "light_units", "exposure", "tonemap", "film_transparent", "frame", "frame_rate",
+SCENE_KEYS = {"environment", "medium", "light_units", "exposure", "tonemap", "contrast", "film_transparent", "frame", "frame_rate",
               "shutter"}
 # Options allowed in a stage: about the picture, without files and permissions, because a stage may come from an
 # untrusted source. scripts/generate.sh writes the list from the program's definition of options.

@@ -7,12 +7,13 @@ use caustique::options::FinishOptions;
 use caustique::pipeline::{OpenFinish, finish};
 use caustique::scene::description::PictureDefaults;
 
-/// Exposure and tone curve of a render's scene, as its header has them.
+/// Exposure, tone curve and contrast of a render's scene, as its header has them.
 pub fn look_of(attributes: &Attributes) -> PictureDefaults {
     let header = attributes.object().unwrap_or_default();
     let exposure = header["exposure"].as_f64().map(|exposure| exposure as f32);
     let tonemap = serde_json::from_value(header["tonemap"].clone()).ok();
-    PictureDefaults { exposure, tonemap, ..PictureDefaults::default() }
+    let contrast = serde_json::from_value(header["contrast"].clone()).ok();
+    PictureDefaults { exposure, tonemap, contrast, ..PictureDefaults::default() }
 }
 
 /// Opens a finish (denoiser and network) for this number of bandwidth levels, and warns if the preferred denoiser is

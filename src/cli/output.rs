@@ -3,7 +3,7 @@
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::{LayerSet, Naming};
 use caustique::image::exr::{self, ColourSpace, Compression};
-use caustique::image::tonemap::ToneMap;
+use caustique::image::tonemap::{Contrast, Look, ToneMap};
 use caustique::image::{atomic, png};
 use caustique::options::number::Ranged;
 use caustique::scene::description::PictureDefaults;
@@ -31,6 +31,11 @@ pub struct PictureArgs {
     #[serde(skip)]
     #[arg(hide_short_help = true)]
     pub tonemap: Option<ToneMap>,
+    /// Contrast of the tone curves agx and filmic, as Blender's looks [default: the scene's, else medium]
+    #[arg(long, value_enum)]
+    #[serde(skip)]
+    #[arg(hide_short_help = true)]
+    pub contrast: Option<Contrast>,
     /// Compression of the EXR; all are lossless
     #[arg(long, value_enum, default_value_t)]
     #[arg(hide_short_help = true)]
@@ -54,8 +59,12 @@ pub struct PictureArgs {
 }
 
 impl PictureArgs {
-    /// Checks that the PNG can be written.
+    /// Checks that the PNG can be written with the wanted look.
     pub fn check(&self) -> Result<()> {
+        if self.contrast.is_some() && matches!(self.tonemap, Some(ToneMap::Neutral | ToneMap::Srgb)) {
+            let error = Error::usage("--contrast: the tone curve of --tonemap has only one");
+            return Err(error.hint("choose --tonemap agx or filmic, or leave --contrast out"));
+        }
         self.png.as_deref().map_or(Ok(()), |path| check(path, "png"))
     }
 
@@ -65,20 +74,23 @@ impl PictureArgs {
         exr::Options { compression, naming, half, multi_part, colour_space: colorspace }
     }
 
-    /// Exposure in stops and tone curve of the PNG: the user's, else the scene's.
-    pub fn look(&self, made_for: &PictureDefaults) -> (f32, ToneMap) {
-        let exposure = self.exposure.map(|ev| ev as f32).or(made_for.exposure).unwrap_or(0.0);
-        (exposure, self.tonemap.or(made_for.tonemap).unwrap_or_default())
+    /// The look of the PNG: the user's, else the scene's.
+    pub fn look(&self, made_for: &PictureDefaults) -> Look {
+        Look {
+            exposure: self.exposure.map(|ev| ev as f32).or(made_for.exposure).unwrap_or_default(),
+            tonemap: self.tonemap.or(made_for.tonemap).unwrap_or_default(),
+            contrast: self.contrast.or(made_for.contrast).unwrap_or_default(),
+        }
     }
 
     /// Writes the PNG, if the user wants one.
     pub fn write_png(&self, set: &LayerSet, made_for: &PictureDefaults) -> Result<()> {
         let Some(path) = &self.png else { return Ok(()) };
-        let (exposure, tonemap) = self.look(made_for);
+        let look = self.look(made_for);
         let alpha = set.get("").and_then(|beauty| beauty.plane("A")).filter(|_| made_for.film_transparent);
         match alpha {
-            Some(alpha) => png::write_transparent(path, &set.beauty()?, &alpha.values, exposure, tonemap),
-            None => png::write_tonemapped(path, &set.beauty()?, exposure, tonemap),
+            Some(alpha) => png::write_transparent(path, &set.beauty()?, &alpha.values, look),
+            None => png::write_tonemapped(path, &set.beauty()?, look),
         }
     }
 }

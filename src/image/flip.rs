@@ -8,7 +8,6 @@
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 
-use super::tonemap::aces;
 use crate::film::{Picture, Size};
 use crate::math::{Rgb, luminance};
 
@@ -49,6 +48,14 @@ pub fn hdr(reference: &Picture, test: &Picture) -> Vec<f32> {
         }
     }
     map
+}
+
+/// Display value, linear, 0 to 1, of a linear channel by a rational fit to ACES' reference rendering and output
+/// transforms (Narkowicz 2015, "ACES Filmic Tone Mapping Curve").
+fn aces(x: f32) -> f32 {
+    // Larger squares would overflow; the curve exceeds 1 there.
+    let x = x.min(1e6);
+    (x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)).clamp(0.0, 1.0)
 }
 
 /// LDR-FLIP of `test` against `reference` per pixel, both display-linear Rec. 709 from 0 to 1.

@@ -2,6 +2,7 @@
 
 pub mod atomic;
 pub mod exr;
+mod filmic;
 pub mod flip;
 pub mod heat;
 pub mod metrics;

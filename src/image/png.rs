@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::error::{Error, ErrorKind, Result};
 use crate::film::{Picture, Size};
 use crate::image::atomic;
-use crate::image::tonemap::ToneMap;
+use crate::image::tonemap::Look;
 use crate::math::Rgb;
 
 /// Writes `pixels`, display values from 0 to 1, row by row from the top, as an 8-bit RGB PNG, atomically (see
@@ -43,15 +43,14 @@ where
     Ok(encoded.into_inner())
 }
 
-/// Writes a scene-linear Rec. 709 picture with a transparent background after an exposure of `ev` stops and a tone curve.
-/// Colours are multiplied by `alpha`, as in an EXR; those of the PNG are not.
+/// Writes a scene-linear Rec. 709 picture with a transparent background under a look. Colours are multiplied by `alpha`, as in an EXR; those of the PNG are not.
 ///
 /// # Errors
 /// The number of pixels is zero or not that of `alpha`; errors of the file system.
-pub fn write_transparent(path: &Path, picture: &Picture, alpha: &[f32], ev: f32, curve: ToneMap) -> Result<()> {
+pub fn write_transparent(path: &Path, picture: &Picture, alpha: &[f32], look: Look) -> Result<()> {
     let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
     let pixel = |(&rgb, &alpha): (&[f32; 3], &f32)| {
-        let color = curve.display(Rgb::from_array(rgb) / if alpha > 0.0 { alpha } else { 1.0 }, ev);
+        let color = look.display(Rgb::from_array(rgb) / if alpha > 0.0 { alpha } else { 1.0 });
         color.to_array().into_iter().chain([alpha]).map(byte).collect::<Vec<u8>>()
     };
     let bytes = picture.iter().zip(alpha).flat_map(pixel).collect();
@@ -60,18 +59,18 @@ pub fn write_transparent(path: &Path, picture: &Picture, alpha: &[f32], ev: f32,
     atomic::write_bytes(path, &encoded.map_err(|error| error.within(path.display()))?)
 }
 
-/// Writes a scene-linear Rec. 709 picture after an exposure of `ev` stops and a tone curve, see [`write()`].
+/// Writes a scene-linear Rec. 709 picture under a look, see [`write()`].
 ///
 /// # Errors
 /// As [`write()`].
-pub fn write_tonemapped(path: &Path, picture: &Picture, ev: f32, curve: ToneMap) -> Result<()> {
-    write(path, picture.size(), picture.iter().map(|&rgb| curve.display(rgb.into(), ev)))
+pub fn write_tonemapped(path: &Path, picture: &Picture, look: Look) -> Result<()> {
+    write(path, picture.size(), picture.iter().map(|&rgb| look.display(rgb.into())))
 }
 
 /// The bytes of the PNG that [`write_tonemapped()`] writes.
 ///
 /// # Errors
 /// The picture has no pixels.
-pub fn encode_tonemapped(picture: &Picture, ev: f32, curve: ToneMap) -> Result<Vec<u8>> {
-    encode(picture.size(), picture.iter().map(|&rgb| curve.display(rgb.into(), ev)))
+pub fn encode_tonemapped(picture: &Picture, look: Look) -> Result<Vec<u8>> {
+    encode(picture.size(), picture.iter().map(|&rgb| look.display(rgb.into())))
 }

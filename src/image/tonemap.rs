@@ -2,23 +2,41 @@
 
 use glam::{Mat3, Vec3};
 
-use crate::math::Rgb;
-pub use crate::scene::description::ToneMap;
+use super::filmic::filmic;
+use crate::math::{Rgb, luminance};
+pub use crate::scene::description::{Contrast, ToneMap};
 
-impl ToneMap {
-    /// Display value, sRGB-encoded, 0 to 1, of a scene-linear Rec. 709 colour after an exposure of `ev` stops. A NaN
-    /// channel counts as 0; infinity is the brightest value.
-    pub fn display(self, colour: Rgb, ev: f32) -> Rgb {
+/// How a picture is shown: exposure, tone curve and contrast.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Look {
+    /// Exposure in stops.
+    pub exposure: f32,
+    /// Tone curve.
+    pub tonemap: ToneMap,
+    /// Contrast of the tone curve, if that is AgX or Filmic.
+    pub contrast: Contrast,
+}
+
+impl From<ToneMap> for Look {
+    fn from(tonemap: ToneMap) -> Look {
+        Look { tonemap, ..Look::default() }
+    }
+}
+
+impl Look {
+    /// Display value, sRGB-encoded, 0 to 1, of a scene-linear Rec. 709 colour. A NaN channel counts as 0; infinity is the
+    /// brightest value.
+    pub fn display(&self, colour: Rgb) -> Rgb {
         // f32::max and clamp would let NaN through; Vec3's max does not.
         let clean = colour.to_array().map(|v| if v.is_nan() { 0.0 } else { v.clamp(0.0, 1e30) });
-        let exposed = (Vec3::from_array(clean) * ev.exp2()).min(Vec3::splat(1e30));
-        let linear = match self {
-            ToneMap::Agx => agx(exposed),
-            ToneMap::Filmic => Vec3::from_array(exposed.to_array().map(|v| aces(v * PRE_EXPOSURE))),
+        let exposed = (Vec3::from_array(clean) * self.exposure.exp2()).min(Vec3::splat(1e30));
+        let linear = match self.tonemap {
+            ToneMap::Agx => agx(exposed, self.contrast),
+            ToneMap::Filmic => return filmic(exposed, self.contrast),
             ToneMap::Neutral => neutral(exposed),
             ToneMap::Srgb => exposed,
         };
-        Vec3::from_array(linear.to_array().map(srgb_encode))
+        linear.map(srgb_encode)
     }
 }
 
@@ -32,17 +50,6 @@ pub fn srgb_encode(linear: f32) -> f32 {
 pub fn srgb_decode(encoded: f32) -> f32 {
     let v = encoded.clamp(0.0, 1.0);
     if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
-}
-
-/// Factor on colours before Narkowicz's curve, as he advises: its 1 is brighter than the white of a scene.
-const PRE_EXPOSURE: f32 = 0.6;
-
-/// Display value, linear, 0 to 1, of a linear channel by a rational fit to ACES' reference rendering and output
-/// transforms (Narkowicz 2015, "ACES Filmic Tone Mapping Curve").
-pub(super) fn aces(x: f32) -> f32 {
-    // Larger squares would overflow; the curve exceeds 1 there.
-    let x = x.min(1e6);
-    (x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)).clamp(0.0, 1.0)
 }
 
 /// Khronos PBR Neutral tone mapper (Khronos Group 2024, ToneMapping/PBR_Neutral): linear Rec. 709 to linear Rec. 709.
@@ -65,13 +72,13 @@ fn neutral(colour: Rgb) -> Rgb {
     (colour * (compressed / peak)).lerp(Vec3::splat(compressed), grey)
 }
 
-/// AgX, the base look as Blender 4 shows it: linear Rec. 709 to linear Rec. 709.
+/// AgX as Blender 4 shows it: linear Rec. 709 to linear Rec. 709.
 ///
 /// In Rec. 2020, an inset moves the primaries towards white; a sigmoid maps log2 over 16.5 stops around middle grey 0.18;
 /// the power of 2.4 is undone; three fifths of the hue shift of the curve is reverted; an outset restores colourfulness. After T. Sobotka (github.com/sobotka/AgX) and E. Chow (github.com/EaryChow/AgX_LUT_Gen,
 /// whose "mix percent" is 40); matrices rounded as Filament has them. Colours outside
 /// Rec. 709 are clipped, not compressed as Blender does.
-fn agx(colour: Rgb) -> Rgb {
+fn agx(colour: Rgb, contrast: Contrast) -> Rgb {
     /// Matrix, by rows, from Rec. 709 to Rec. 2020 (ITU-R BT.2087).
     const TO_2020: [[f32; 3]; 3] = [[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0113], [0.0164, 0.0880, 0.8956]];
     const INSET: [[f32; 3]; 3] = [
@@ -90,7 +97,7 @@ fn agx(colour: Rgb) -> Rgb {
 
     let rows = |m: &[[f32; 3]; 3]| Mat3::from_cols_array_2d(m).transpose();
     let to_2020 = rows(&TO_2020);
-    let inset = (rows(&INSET) * to_2020 * colour).max(Vec3::splat(1e-10));
+    let inset = with_contrast((rows(&INSET) * to_2020 * colour).max(Vec3::splat(1e-10)), contrast);
     let curved = inset.to_array().map(|v| sigmoid((v.log2() - MIN_EV) / (MAX_EV - MIN_EV)));
     let linear = curved.map(|v| v.powf(2.4));
     let (before, after) = (hue(inset.to_array()), hue(linear));
@@ -98,6 +105,25 @@ fn agx(colour: Rgb) -> Rgb {
     let turned = (after - before + 9.0).rem_euclid(6.0) - 3.0;
     let restored = with_hue(linear, before + 0.4 * turned);
     to_2020.inverse() * (rows(&OUTSET) * restored)
+}
+
+/// A colour in AgX's primaries after a look of Blender: the logarithm is stretched about middle grey, and then its
+/// saturation changes.
+fn with_contrast(colour: Rgb, contrast: Contrast) -> Rgb {
+    const MIDDLE_GREY: f32 = 0.18;
+    let (contrast, saturation) = match contrast {
+        Contrast::VeryHigh => (1.57, 0.9),
+        Contrast::High => (1.4, 0.95),
+        Contrast::MediumHigh => (1.2, 1.0),
+        Contrast::Medium => return colour,
+        Contrast::MediumLow => (0.9, 1.05),
+        Contrast::Low => (0.8, 1.1),
+        Contrast::VeryLow => (0.7, 1.15),
+    };
+    let stops = (colour / MIDDLE_GREY).map(f32::log2) * contrast;
+    let graded = Vec3::splat(luminance(stops)).lerp(stops, saturation);
+    // Within what the sigmoid distinguishes, so that no power overflows.
+    MIDDLE_GREY * graded.clamp(Vec3::splat(-20.0), Vec3::splat(20.0)).map(f32::exp2)
 }
 
 /// Hue of the hexagonal model (HSV) in sixths of a turn, red 0, green 2, blue 4; of grey, 0.

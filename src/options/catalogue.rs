@@ -66,12 +66,13 @@ pub enum ValueKind {
 }
 
 /// Options that are not arguments in Python, and why.
-const NOT_IN_PYTHON: [(&str, &str); 18] = [
+const NOT_IN_PYTHON: [(&str, &str); 19] = [
     ("verbose", "Python's warnings are not grouped"),
     ("output", "the picture is an Image: its method save writes it"),
     ("png", "an argument of Image.save"),
     ("exposure", "an argument of Image.save"),
     ("tonemap", "an argument of Image.save"),
+    ("contrast", "an argument of Image.save"),
     ("compression", "an argument of Image.save"),
     ("half", "an argument of Image.save"),
     ("multi_part", "an argument of Image.save"),
@@ -214,6 +215,7 @@ mod tests {
             "png",
             "exposure",
             "tonemap",
+            "contrast",
             "compression",
             "half",
             "multi_part",

@@ -148,6 +148,7 @@ impl Contents<'_> {
         header.extend(self.facts.made_for.frame_rate.map(|rate| ("frame_rate".to_owned(), json!(rate))));
         header.extend(self.facts.made_for.exposure.map(|exposure| ("exposure".to_owned(), json!(exposure))));
         header.extend(self.facts.made_for.tonemap.map(|curve| ("tonemap".to_owned(), json!(curve))));
+        header.extend(self.facts.made_for.contrast.map(|contrast| ("contrast".to_owned(), json!(contrast))));
         header.insert("error_of".into(), "Noisy".into());
         header
     }

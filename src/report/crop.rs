@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::film::{Picture, Size};
-use crate::image::tonemap::ToneMap;
+use crate::image::tonemap::Look;
 use crate::image::{heat, png, relative_squared_error};
 use std::ops::Range;
 
@@ -48,15 +48,6 @@ impl Window {
     fn indices(self, width: usize) -> impl Iterator<Item = usize> {
         (self.y..self.y + self.height).flat_map(move |y| (self.x..self.x + self.width).map(move |x| y * width + x))
     }
-}
-
-/// Exposure and tone curve of the pictures in the report.
-#[derive(Clone, Copy, Debug)]
-pub struct Look {
-    /// Exposure of the pictures in stops.
-    pub exposure: f32,
-    /// Tone curve of the pictures.
-    pub tonemap: ToneMap,
 }
 
 /// The relative error of a pixel `x` against its reference `r`, clamped to 1: the root of its term of relMSE.
@@ -129,7 +120,7 @@ pub fn scale(pictures: &[Picture], reference: &Picture, windows: &[Window]) -> f
 /// The window is empty.
 pub fn picture(picture: &Picture, window: Window, look: Look) -> Result<Vec<u8>> {
     let pixels = window.indices(picture.size().width);
-    png::encode(window.size(), pixels.map(|i| look.tonemap.display(picture[i].into(), look.exposure)))
+    png::encode(window.size(), pixels.map(|i| look.display(picture[i].into())))
 }
 
 /// Heat map of a picture's relative error in a window, as the bytes of a PNG; the error `largest` has the palest

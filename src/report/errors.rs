@@ -7,7 +7,7 @@ use super::page::{data_url, document};
 use crate::error::Result;
 use crate::film::{LayerSet, Picture, channel_mean};
 use crate::finish::ERROR;
-use crate::image::tonemap::ToneMap;
+use crate::image::tonemap::Look;
 use crate::image::{Comparison, heat, png};
 use maud::{Markup, html};
 
@@ -32,9 +32,7 @@ pub fn html(image: &LayerSet, reference: &LayerSet, names: [&str; 2], comparison
         squares.zip(&truth).map(|(square, worth)| relative(square, worth)).collect()
     });
     let largest = scale(found.iter().chain(estimated.iter().flatten()).copied());
-    let look = |pixels: &Picture| {
-        png::encode(pixels.size(), pixels.iter().map(|rgb| ToneMap::default().display((*rgb).into(), 0.0)))
-    };
+    let shown = |pixels: &Picture| png::encode_tonemapped(pixels, Look::default());
     let map = |errors: &[f32], largest: f32| {
         png::encode(image.size(), errors.iter().map(|error| heat::magma(error / largest)))
     };
@@ -42,8 +40,8 @@ pub fn html(image: &LayerSet, reference: &LayerSet, names: [&str; 2], comparison
     let percents = |largest: f32| [0.0, 0.5, 1.0].map(|part| format!("{} %", short(100.0 * f64::from(part * largest))));
     let plain = [0.0, 0.5, 1.0].map(short);
     let mut figures = vec![
-        figure(names[0], &data_url(&look(&pixels)?), None),
-        figure(names[1], &data_url(&look(&truth)?), None),
+        figure(names[0], &data_url(&shown(&pixels)?), None),
+        figure(names[1], &data_url(&shown(&truth)?), None),
         figure("relative error against it", &data_url(&map(&found, largest)?), Some((&bar, &percents(largest)))),
     ];
     if let Some(estimated) = &estimated {

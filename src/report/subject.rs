@@ -1,9 +1,10 @@
 //! The compared runs and the options of their report.
 
-use super::crop::{Look, Window};
+use super::crop::Window;
 use super::entry::{Entry, Line, Metric};
 use super::equal_time::Rules;
 use super::reference::Reference;
+use crate::image::tonemap::Look;
 use crate::peers::Peer;
 
 /// The subject of a report: the compared runs and the conditions.

@@ -167,6 +167,8 @@ pub struct PictureDefaults {
     pub exposure: Option<f32>,
     /// Tone curve for display; `None` if the file does not set it.
     pub tonemap: Option<ToneMap>,
+    /// Contrast of the tone curve; `None` if the file does not set it.
+    pub contrast: Option<Contrast>,
     /// Whether the background is transparent: camera rays do not see the environment, and alpha is the coverage of a
     /// pixel.
     pub film_transparent: bool,
@@ -188,12 +190,34 @@ pub enum ToneMap {
     /// Soft shoulder, highlights lose colour: what Blender shows
     #[default]
     Agx,
-    /// A film-like curve per channel: more contrast, bright colours keep their wavelength and clip
+    /// Blender's Filmic, the view of its files before 4.0: more contrast, bright lights turn white
     Filmic,
     /// Khronos PBR Neutral: base colours of products stay as they are, only highlights are compressed
     Neutral,
     /// No curve: what is brighter than white is cut off
     Srgb,
+}
+
+/// Contrast of the tone curves AgX and Filmic, as Blender's looks of these names.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "kebab-case")]
+pub enum Contrast {
+    /// The steepest curve
+    VeryHigh,
+    /// A steep curve
+    High,
+    /// A slightly steeper curve
+    MediumHigh,
+    /// The curve without a look
+    #[default]
+    Medium,
+    /// A slightly flatter curve
+    MediumLow,
+    /// A flat curve
+    Low,
+    /// The flattest curve
+    VeryLow,
 }
 
 /// Projection of a camera.

@@ -6,7 +6,10 @@ use std::path::{Path, PathBuf};
 use caustique::error::ErrorKind;
 use caustique::film::{Layer, LayerSet, Naming, Picture, Role, Sample, Selection, Size};
 use caustique::image::exr::{self, Attributes, ColourSpace, Compression, Options};
-use caustique::image::{atomic, png, tonemap::ToneMap};
+use caustique::image::{
+    atomic, png,
+    tonemap::{Look, ToneMap},
+};
 use caustique::scene::description::EnvironmentSource;
 use caustique::scene::environment_file;
 
@@ -547,10 +550,10 @@ fn pngs_hold_the_display_values() {
     let path = folder.path().join("a.png");
     let pixels = [[0.0, 0.5, 1.0], [f32::NAN, f32::INFINITY, -1.0]];
     let scene = Picture::new(Size { width: 2, height: 1 }, pixels.to_vec());
-    png::write_tonemapped(&path, &scene, 0.0, ToneMap::Srgb).unwrap();
+    png::write_tonemapped(&path, &scene, ToneMap::Srgb.into()).unwrap();
     let picture = image::open(&path).unwrap().into_rgb8();
     assert_eq!(picture.as_raw().as_slice(), [0, 188, 255, 0, 255, 0]);
-    png::write_tonemapped(&path, &scene, 1.0, ToneMap::Srgb).unwrap();
+    png::write_tonemapped(&path, &scene, Look { exposure: 1.0, ..ToneMap::Srgb.into() }).unwrap();
     assert_eq!(image::open(&path).unwrap().into_rgb8().as_raw()[1], 255);
     for (width, height) in [(0, 1), (1, 1), (3, 1)] {
         assert!(png::write(&path, Size { width, height }, pixels.map(Into::into)).is_err());

@@ -2,7 +2,7 @@
 //! published values.
 
 use caustique::film::{Layer, LayerSet, Picture, Size};
-use caustique::image::tonemap::{ToneMap, srgb_decode};
+use caustique::image::tonemap::{Contrast, Look, ToneMap, srgb_decode};
 use caustique::image::{Floor, compare, flip, heat, metrics};
 use caustique::math::Rgb;
 
@@ -238,38 +238,81 @@ const BLENDER_AGX: [([f32; 3], [f32; 3]); 8] = [
 #[test]
 fn agx_looks_like_blenders() {
     for (scene, display) in BLENDER_AGX {
-        let found = ToneMap::Agx.display(Rgb::from_array(scene), 0.0);
+        let found = Look::from(ToneMap::Agx).display(Rgb::from_array(scene));
         for c in 0..3 {
             assert!((found[c] - display[c]).abs() < 0.006, "{scene:?}: {found}, expected {display:?}");
         }
     }
 }
 
+/// Display colours of Blender 4.5 for scene-linear colours: view transform AgX, the look of this contrast, display sRGB.
+const BLENDER_AGX_LOOKS: [(Contrast, [f32; 3], [f32; 3]); 7] = [
+    (Contrast::VeryHigh, [0.18, 0.18, 0.18], [0.4614, 0.4613, 0.4613]),
+    (Contrast::VeryHigh, [0.5, 0.1, 0.05], [0.7718, 0.2867, 0.0909]),
+    (Contrast::VeryHigh, [0.02, 0.3, 2.0], [0.5145, 0.6961, 0.9960]),
+    (Contrast::MediumHigh, [0.5, 0.1, 0.05], [0.7352, 0.3234, 0.1824]),
+    (Contrast::Low, [0.18, 0.18, 0.18], [0.4613, 0.4613, 0.4613]),
+    (Contrast::Low, [0.5, 0.1, 0.05], [0.6739, 0.3689, 0.2729]),
+    (Contrast::Low, [0.004, 0.002, 0.001], [0.0640, 0.0328, 0.0150]),
+];
+
+#[test]
+fn contrasts_of_agx_look_like_blenders() {
+    for (contrast, scene, display) in BLENDER_AGX_LOOKS {
+        let found = Look { contrast, ..ToneMap::Agx.into() }.display(Rgb::from_array(scene));
+        let error = (found - Rgb::from_array(display)).abs().max_element();
+        assert!(error < 0.009, "{contrast:?} of {scene:?}: {found}, expected {display:?}");
+    }
+}
+
+/// Rows of the table: contrast, scene-linear colour, and display value in 255ths.
+fn blenders_filmic() -> Vec<(Contrast, Rgb, Rgb)> {
+    let rows = include_str!("filmic.csv").lines().filter(|line| !line.starts_with('#'));
+    let row = |line: &str| {
+        let (contrast, numbers) = line.split_once(',').unwrap();
+        let numbers: Vec<f32> = numbers.split(',').map(|number| number.parse().unwrap()).collect();
+        let contrast = serde_json::from_value(contrast.into()).unwrap();
+        (contrast, Rgb::from_slice(&numbers[..3]), Rgb::from_slice(&numbers[3..]))
+    };
+    rows.map(row).collect()
+}
+
+#[test]
+fn filmic_is_blenders() {
+    let grey = Look::from(ToneMap::Filmic).display(Rgb::splat(0.0509)) * 255.0;
+    assert_eq!(grey.round(), Rgb::splat(70.0));
+    for (contrast, colour, expected) in blenders_filmic() {
+        let shown = Look { contrast, ..ToneMap::Filmic.into() }.display(colour) * 255.0;
+        assert!((shown - expected).abs().max_element() < 0.2, "{contrast:?} of {colour}: {shown}, expected {expected}");
+    }
+}
+
 #[test]
 fn every_curve_keeps_order_and_bounds() {
-    for curve in [ToneMap::Agx, ToneMap::Filmic, ToneMap::Neutral, ToneMap::Srgb] {
-        assert!(curve.display(Rgb::ZERO, 0.0).max_element() < 0.003, "{curve:?}");
+    let contrasts = [Contrast::VeryHigh, Contrast::Medium, Contrast::VeryLow];
+    let curves = [ToneMap::Agx, ToneMap::Filmic, ToneMap::Neutral, ToneMap::Srgb];
+    for look in curves.iter().flat_map(|&curve| contrasts.map(|contrast| Look { contrast, ..curve.into() })) {
+        assert!(look.display(Rgb::ZERO).max_element() < 0.003, "{look:?}");
         let mut last = -1.0;
         for i in -40..=40 {
-            let shown = curve.display(Rgb::splat((i as f32 / 2.0).exp2()), 0.0);
+            let shown = look.display(Rgb::splat((i as f32 / 2.0).exp2()));
             assert!(shown.min_element() >= 0.0 && shown.max_element() <= 1.0);
-            assert!(shown.x >= last, "{curve:?} at {i}");
+            assert!(shown.x >= last, "{look:?} at {i}");
             last = shown.x;
         }
-        assert!(last > 0.99, "{curve:?}: {last}");
+        assert!(last > 0.99, "{look:?}: {last}");
         // One stop of exposure doubles the light.
-        let (a, b) = (curve.display(Rgb::new(0.2, 0.1, 0.4), 1.0), curve.display(Rgb::new(0.4, 0.2, 0.8), 0.0));
+        let exposed = |exposure| Look { exposure, ..look };
+        let (a, b) = (exposed(1.0).display(Rgb::new(0.2, 0.1, 0.4)), look.display(Rgb::new(0.4, 0.2, 0.8)));
         assert!((a - b).abs().max_element() < 1e-6);
         for wild in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -1.0] {
             for ev in [-200.0, 0.0, 200.0] {
-                let shown = curve.display(Rgb::new(wild, 0.5, wild), ev);
-                assert!(
-                    shown.is_finite() && shown.min_element() >= 0.0 && shown.max_element() <= 1.0,
-                    "{curve:?} {wild}"
-                );
+                let shown = exposed(ev).display(Rgb::new(wild, 0.5, wild));
+                let bounded = shown.min_element() >= 0.0 && shown.max_element() <= 1.0;
+                assert!(shown.is_finite() && bounded, "{look:?} {wild}");
             }
         }
-        assert!(curve.display(Rgb::NAN, 0.0).max_element() < 0.003);
+        assert!(look.display(Rgb::NAN).max_element() < 0.003);
     }
 }
 
@@ -283,17 +326,9 @@ fn neutral_is_the_published_curve() {
         ([2.0, 0.5, 0.25], [0.96, 0.321_136, 0.214_658]),
         ([10.0, 10.0, 10.0], [0.993_898, 0.993_898, 0.993_898]),
     ] {
-        let shown = ToneMap::Neutral.display(Rgb::from_array(colour), 0.0).to_array().map(srgb_decode);
+        let shown = Look::from(ToneMap::Neutral).display(Rgb::from_array(colour)).to_array().map(srgb_decode);
         for (shown, expected) in shown.into_iter().zip(expected) {
             assert!((shown - expected).abs() < 1e-4, "{colour:?}: {shown} instead of {expected}");
         }
     }
-}
-
-#[test]
-fn filmic_is_the_published_curve() {
-    // Narkowicz's fit at 0.6: (0.6 (2.51 0.6 + 0.03)) / (0.6 (2.43 0.6 + 0.59) + 0.14), sRGB-encoded.
-    let linear = 0.6 * (2.51 * 0.6 + 0.03) / (0.6 * (2.43 * 0.6 + 0.59) + 0.14);
-    let shown = ToneMap::Filmic.display(Rgb::ONE, 0.0).x;
-    assert!((srgb_decode(shown) - linear).abs() < 1e-5);
 }

@@ -36,6 +36,7 @@ class Pictures(cycles_comparison.CyclesComparison):
         scene.render.use_border, scene.render.border_min_x, scene.render.border_max_y = True, 0.25, 0.5
         scene.render.film_transparent, scene.cycles.film_exposure = True, 4.0
         scene.view_settings.view_transform, scene.view_settings.exposure = "Standard", -1.0
+        scene.view_settings.look = "High Contrast"
         warnings = "\n".join(export.write(self.path))
         said = glb.read(self.path)[0]["scenes"][0]["extras"]["caustique"]
         self.assertEqual(said["resolution"], [32, 32])
@@ -44,6 +45,23 @@ class Pictures(cycles_comparison.CyclesComparison):
         self.assertIn('object "floor" is seen, also beyond its clip end of 4 m', warnings)
         self.assertNotIn("clip start", warnings)
         self.assertIn("film exposure of 4", warnings)
+        self.assertIn('its look "High Contrast" is not carried', warnings)
+
+    def test_looks_of_contrast_are_exported(self):
+        view = self.scene.view_settings
+        for transform, look, expected in (
+            ("Filmic", "None", ("filmic", None)),
+            ("Filmic", "Very High Contrast", ("filmic", "very-high")),
+            ("AgX", "AgX - Medium Low Contrast", ("agx", "medium-low")),
+            ("AgX", "AgX - Base Contrast", ("agx", "medium")),
+        ):
+            view.view_transform, view.look = transform, look
+            warnings = export.write(self.path)
+            said = glb.read(self.path)[0]["scenes"][0]["extras"]["caustique"]
+            self.assertEqual((said["tonemap"], said.get("contrast")), expected)
+            self.assertNotIn("look", "\n".join(warnings))
+        view.look = "AgX - Punchy"
+        self.assertIn('its look "AgX - Punchy" is not carried', "\n".join(export.write(self.path)))
 
     def test_losses_are_repeated_by_every_command(self):
         """info, plan, render and the EXR repeat the exporter's warnings, and --strict makes them errors."""

@@ -9,6 +9,7 @@ use crate::work::{Caller, work};
 use caustique::camera::Camera;
 use caustique::error::Result;
 use caustique::finish::Finish;
+use caustique::image::tonemap::Look;
 use caustique::options::{MethodChoice, RenderOptions, SceneOptions};
 use caustique::pipeline::check::check_settings;
 use caustique::pipeline::choose::{Chosen, choose};
@@ -16,7 +17,6 @@ use caustique::pipeline::plan::{self, PlanInput};
 use caustique::pipeline::{Loaded, OpenFinish, finish, memory, with_light_paths};
 use caustique::plan::{Effect, Presence};
 use caustique::render::{Control, Method, Settings};
-use caustique::report::crop::Look;
 use caustique::report::data;
 use caustique::report::entry::{Entry, Metric};
 use caustique::report::equal_time::{Participants, Rules, render_in_turns};
@@ -235,7 +235,7 @@ impl Comparison {
             rules,
             reference,
         };
-        let look = Look { exposure: 0.0, tonemap: Default::default() };
+        let look = Look::default();
         let none =
             ReportOptions { targets: Vec::new(), targets_of: Vec::new(), windows: Vec::new(), look, notes: Vec::new() };
         let summary = summarize(&subject, &mut outcome, &none)?;

@@ -7,7 +7,7 @@ use caustique::error::{Error, ErrorKind};
 use caustique::film::{Layer, LayerSet, Plane, Sample, describe};
 use caustique::image::exr::{self, Attributes};
 use caustique::image::png;
-use caustique::image::tonemap::ToneMap;
+use caustique::image::tonemap::Look;
 use caustique::memory;
 use caustique::pipeline::Delivery;
 use caustique::pipeline::shard::ShardSums;
@@ -177,7 +177,7 @@ impl Image {
 
     /// The picture as a tone-mapped PNG, which notebooks show.
     fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let encoded = py.detach(|| png::encode_tonemapped(&self.set.beauty()?, 0.0, ToneMap::default()));
+        let encoded = py.detach(|| png::encode_tonemapped(&self.set.beauty()?, Look::default()));
         encoded.map(|bytes| PyBytes::new(py, &bytes)).map_err(raised)
     }
 
@@ -190,9 +190,11 @@ impl Image {
     /// colorspace    of the EXR: 'rec709' or 'acescg'
     /// exposure      of the PNG, stops
     /// tonemap       of the PNG: 'agx', 'filmic', 'neutral' or 'srgb'
+    /// contrast      of the tone curves 'agx' and 'filmic': 'very-high', 'high', 'medium-high', 'medium', 'medium-low',
+    ///               'low' or 'very-low'
     #[pyo3(signature = (
         path, *, compression = "zip", half = false, multi_part = false, exr_naming = "plain", colorspace = "rec709",
-        exposure = 0.0, tonemap = "agx"
+        exposure = 0.0, tonemap = "agx", contrast = "medium"
     ))]
     #[expect(clippy::too_many_arguments, reason = "they are those of Python's signature")]
     fn save(
@@ -206,11 +208,13 @@ impl Image {
         colorspace: &str,
         exposure: f32,
         tonemap: &str,
+        contrast: &str,
     ) -> PyResult<()> {
         let compression = choice("save: compression", compression)?;
         let naming = choice("save: exr_naming", exr_naming)?;
         let colour_space = choice("save: colorspace", colorspace)?;
-        let curve = choice("save: tonemap", tonemap)?;
+        let tonemap = choice("save: tonemap", tonemap)?;
+        let look = Look { exposure, tonemap, contrast: choice("save: contrast", contrast)? };
         let is = |extension: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension));
         let set = &self.set;
         let written = py.detach(|| match () {
@@ -220,7 +224,7 @@ impl Image {
                     self.sums.as_ref().map_or(Ok(()), |sums| sums.write(file))
                 })
             }
-            () if is("png") => png::write_tonemapped(&path, &set.beauty()?, exposure, curve),
+            () if is("png") => png::write_tonemapped(&path, &set.beauty()?, look),
             () => Err(Error::new(ErrorKind::Usage, path.display(), "the name ends neither in .exr nor in .png")
                 .hint("an EXR holds all layers, a PNG is a picture to look at")),
         });

@@ -15,13 +15,14 @@ use super::{finish_options, say, scene};
 use caustique::camera::Camera;
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::finish::Finish;
+use caustique::image::tonemap::Look;
 use caustique::pipeline::check::check_settings;
 use caustique::pipeline::choose::{Chosen, choose};
 use caustique::pipeline::plan::{self, PlanInput};
 use caustique::pipeline::{Loaded, OpenFinish, memory, with_light_paths};
 use caustique::plan::switch::Removed;
 use caustique::render::{Control, Settings};
-use caustique::report::crop::{Look, Window};
+use caustique::report::crop::Window;
 use caustique::report::entry::Entry;
 use caustique::report::equal_time::{Participants, Rules, render_in_turns};
 use caustique::report::summary::{ReportOptions, Subject, find, summarize};
@@ -99,7 +100,7 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
         rules,
         reference,
     };
-    let look = Look { exposure: args.exposure as f32, tonemap: args.tonemap };
+    let look = Look { exposure: args.exposure as f32, ..args.tonemap.into() };
     let wishes = ReportOptions { targets: args.targets.clone(), targets_of: more, windows, look, notes };
     let summary = summarize(&subject, &mut outcome, &wishes)?;
     files::write(args, &subject, &mut outcome, &summary, threads)?;

@@ -25,7 +25,7 @@ const TEV_ADDRESS: &str = "127.0.0.1:14158";
 /// Where previews of an unfinished render are shown.
 #[derive(Clone, Debug, Serialize)]
 pub enum Target {
-    /// Previews go to an sRGB file with the exposure and the tone curve of the PNG.
+    /// Previews go to an sRGB file with the look of the PNG.
     Png(PathBuf),
     /// Previews go to a file with scene-linear Rec. 709 radiance and alpha.
     Exr(PathBuf),
@@ -77,7 +77,7 @@ impl Target {
 /// Shows previews of an unfinished render at intervals.
 pub struct Preview<'a> {
     target: &'a Target,
-    /// The user's exposure and tone curve for a PNG.
+    /// The user's look of a PNG.
     look: &'a PictureArgs,
     /// Name of the picture in tev: the path of the output.
     name: String,
@@ -117,10 +117,7 @@ impl<'a> Preview<'a> {
 
     fn write(&mut self, set: &LayerSet, frame: Option<Frame>) -> Result<()> {
         match self.target {
-            Target::Png(path) => {
-                let (exposure, curve) = self.look.look(&self.made_for);
-                png::write_tonemapped(path, &set.beauty()?, exposure, curve)
-            }
+            Target::Png(path) => png::write_tonemapped(path, &set.beauty()?, self.look.look(&self.made_for)),
             Target::Exr(path) => {
                 let options = exr::Options { compression: Compression::None, ..exr::Options::default() };
                 exr::write(path, set, &Attributes { frame, ..Attributes::default() }, options)

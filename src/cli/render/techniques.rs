@@ -41,6 +41,5 @@ fn one(args: &RenderArgs, folder: &Path, name: &str, picture: &Picture, made_for
     set.push(Layer::interleaved("", "RGB", picture.iter().copied()))?;
     let options = args.picture.exr_options(args.run.exr_naming);
     exr::write(&folder.join(format!("{name}.exr")), &set, &Attributes::default(), options)?;
-    let (exposure, curve) = args.picture.look(made_for);
-    png::write_tonemapped(&folder.join(format!("{name}.png")), picture, exposure, curve)
+    png::write_tonemapped(&folder.join(format!("{name}.png")), picture, args.picture.look(made_for))
 }

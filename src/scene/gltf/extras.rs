@@ -7,7 +7,7 @@ use super::texture::Info;
 use crate::error::Result;
 use crate::material::MediumParameters;
 use crate::math::Rgb;
-use crate::scene::description::ToneMap;
+use crate::scene::description::{Contrast, ToneMap};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -23,6 +23,7 @@ pub(super) struct SceneExtras {
     pub(super) resolution: Option<[u32; 2]>,
     pub(super) exposure: Option<f32>,
     pub(super) tonemap: Option<ToneMap>,
+    pub(super) contrast: Option<Contrast>,
     pub(super) crop: Option<[f64; 4]>,
     pub(super) film_transparent: bool,
     pub(super) frame: Option<i32>,
@@ -261,6 +262,7 @@ pub(super) const SCENE: &[&str] = &[
     "resolution",
     "exposure",
     "tonemap",
+    "contrast",
     "crop",
     "film_transparent",
     "frame",

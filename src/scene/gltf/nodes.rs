@@ -280,8 +280,18 @@ impl<'r> Reader<'r> {
 
     /// Checks the settings of the picture in the extras of the scene, and copies them to the description.
     fn picture(&mut self, place: &str) -> Result<()> {
-        let SceneExtras { resolution, exposure, tonemap, crop, film_transparent, frame, frame_rate, shutter, .. } =
-            self.scene;
+        let SceneExtras {
+            resolution,
+            exposure,
+            tonemap,
+            contrast,
+            crop,
+            film_transparent,
+            frame,
+            frame_rate,
+            shutter,
+            ..
+        } = self.scene;
         if resolution.is_some_and(|size| size.contains(&0)) {
             return Err(fault(place, "extras.caustique.resolution must be two numbers above zero"));
         }
@@ -312,7 +322,8 @@ impl<'r> Reader<'r> {
         }
         // A requested frame replaces the frame in the file.
         let frame = self.options.frame.map_or(frame, |frame| i32::try_from(frame.number).ok());
-        self.out.picture = PictureDefaults { resolution, exposure, tonemap, film_transparent, crop, frame, frame_rate };
+        self.out.picture =
+            PictureDefaults { resolution, exposure, tonemap, contrast, film_transparent, crop, frame, frame_rate };
         Ok(())
     }
 

@@ -4,7 +4,7 @@ use caustique::camera::Camera;
 use caustique::estimator::InitialBandwidth;
 use caustique::film::{Layer, LayerSet};
 use caustique::image::exr;
-use caustique::image::tonemap::ToneMap;
+use caustique::image::tonemap::{Look, ToneMap};
 use caustique::math::DVec3;
 use caustique::render::{Levels, Method, RenderInput, Session, Settings};
 use caustique::scene::gltf::{ReadOptions, read};
@@ -195,7 +195,7 @@ impl Reference {
     pub fn errors(&self, shot: &Shot) -> Errors {
         let [a, b] = &self.halves;
         let values = (3 * shot.all.len()) as f64;
-        let shown = |v: DVec3| 255.0 * ToneMap::Srgb.display(v.as_vec3(), 0.0).as_dvec3();
+        let shown = |v: DVec3| 255.0 * Look::from(ToneMap::Srgb).display(v.as_vec3()).as_dvec3();
         let display = |x: DVec3, y: DVec3| (shown(x) - shown(y)).length_squared();
         let each = shot.all.iter().zip(&a.all).zip(&b.all);
         let sum: f64 = each.map(|((x, a), b)| display(*x, 0.5 * (*a + *b)) - 0.25 * display(*a, *b)).sum();

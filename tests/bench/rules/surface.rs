@@ -3,7 +3,7 @@
 use crate::ground::{Ground, settings};
 use caustique::film::Size;
 use caustique::image::png;
-use caustique::image::tonemap::ToneMap;
+use caustique::image::tonemap::Look;
 use caustique::math::{DVec3, Rgb, Vec3};
 use caustique::render::{Method, Session};
 use serde_json::{Value, json};
@@ -52,7 +52,7 @@ pub fn surface(ground: &Ground, photons: u32, iterations: u64, window: [usize; 4
     all.sort_by(f32::total_cmp);
     let (low, high) = (all[all.len() / 100], all[all.len() - 1 - all.len() / 100]);
     let parts = [
-        cut(&|p| ToneMap::Agx.display(picture[p].as_vec3(), 0.0)),
+        cut(&|p| Look::default().display(picture[p].as_vec3())),
         cut(&|p| colour((maps[0][p] / low).ln() / (high / low).ln())),
         cut(&|p| colour((maps[1][p] / low).ln() / (high / low).ln())),
     ];

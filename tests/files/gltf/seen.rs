@@ -4,7 +4,7 @@ use super::glb::Glb;
 use super::{message, read, try_read};
 use caustique::light::SpotEdge;
 use caustique::math::{Vec2, Vec3};
-use caustique::scene::description::{PictureDefaults, PunctualKind, ToneMap};
+use caustique::scene::description::{Contrast, PictureDefaults, PunctualKind, ToneMap};
 use caustique::scene::{CameraRequest, Crop};
 use serde_json::{Value, json};
 
@@ -16,17 +16,18 @@ fn caustique(keys: Value) -> Value {
 fn what_the_picture_was_made_for() {
     let mut file = Glb::new();
     file.json["scenes"][0]["extras"] = caustique(json!({
-        "resolution": [640, 200], "exposure": -1.5, "tonemap": "filmic", "crop": [0, 0, 0.5, 1], "film_transparent": true,
+        "resolution": [640, 200], "exposure": -1.5, "tonemap": "filmic", "contrast": "very-high", "crop": [0, 0, 0.5, 1], "film_transparent": true,
         "frame": 12, "frame_rate": [24000, 1001],
         "losses": ["object \"Hair\": it is gone", "object \"Hair\": it is gone"],
         "environment": {"color": [1, 1, 1], "visible": {"camera": false}},
     }));
     let description = read(&file);
-    let (exposure, tonemap) = (Some(-1.5), Some(ToneMap::Filmic));
+    let (exposure, tonemap, contrast) = (Some(-1.5), Some(ToneMap::Filmic), Some(Contrast::VeryHigh));
     let crop = Some([0.0, 0.0, 0.5, 1.0]);
     let resolution = Some([640, 200]);
     let (frame, frame_rate) = (Some(12), Some([24000, 1001]));
-    let expected = PictureDefaults { resolution, exposure, tonemap, film_transparent: true, crop, frame, frame_rate };
+    let expected =
+        PictureDefaults { resolution, exposure, tonemap, contrast, film_transparent: true, crop, frame, frame_rate };
     assert_eq!(description.picture, expected);
     assert!(description.environment_hidden_from_camera);
     let said = |what: &str| description.warnings.iter().filter(|warning| warning.contains(what)).count();
