@@ -1,9 +1,12 @@
 //! EXR files: written files are read back, have the same bytes every time, and no file crashes the reader.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use ::exr::meta::attribute::AttributeValue;
 use caustique::error::ErrorKind;
+use caustique::film::cryptomatte::{Cryptomatte, PixelRanks};
 use caustique::film::{Layer, LayerSet, Naming, Picture, Role, Sample, Selection, Size};
 use caustique::image::exr::{self, Attributes, ColourSpace, Compression, Options};
 use caustique::image::{
@@ -94,6 +97,37 @@ fn layers_are_read_alone() {
     let whole = fs::read(&path).unwrap();
     fs::write(&path, &whole[..whole.len() / 2]).unwrap();
     assert!(exr::read_header(&path).is_ok() && exr::read_layers(&path, |_| true).is_err());
+}
+
+/// Programs that open one part of a file find the manifest of its cryptomatte there, and in no part that of another.
+#[test]
+fn every_part_of_a_cryptomatte_has_its_texts() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    for naming in [Naming::Plain, Naming::Blender] {
+        let mut set = LayerSet::new(2, 1);
+        set.push(Layer::interleaved("", "RGB", [[0.5; 3]; 2])).unwrap();
+        let mut attributes = Attributes::of(&serde_json::json!({"seed": 7})).unwrap();
+        for kind in ["CryptoObject", "CryptoMaterial"] {
+            let matte = Cryptomatte::new(kind, ["a".to_owned()]);
+            matte.layers(&[PixelRanks::default(); 2], 1.0).into_iter().for_each(|layer| set.push(layer).unwrap());
+            attributes.texts.extend(matte.attributes(naming));
+        }
+        exr::write(&path, &set, &attributes, Options { naming, multi_part: true, ..Options::default() }).unwrap();
+        let parts = ::exr::meta::MetaData::read_from_file(&path, false).unwrap().headers;
+        assert_eq!(parts.len(), 7);
+        for part in &parts[1..] {
+            let name = part.own_attributes.layer_name.as_ref().unwrap().to_string();
+            let kind = if name.contains("Object") { "CryptoObject" } else { "CryptoMaterial" };
+            let expected = BTreeMap::from(Cryptomatte::new(kind, ["a".to_owned()]).attributes(naming));
+            let texts = part.own_attributes.other.iter().filter_map(|(key, value)| match value {
+                AttributeValue::Text(text) => Some((key.to_string(), text.to_string())),
+                _ => None,
+            });
+            assert_eq!(texts.collect::<BTreeMap<_, _>>(), expected, "{name}");
+        }
+        assert_eq!(exr::read(&path).unwrap().1, attributes);
+    }
 }
 
 #[test]

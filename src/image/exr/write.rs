@@ -84,9 +84,11 @@ pub fn write_followed(
         let cause = format!("{channels} channels of {} x {} pixels are no picture", set.width, set.height);
         return Err(Error::new(ErrorKind::Image, path.display(), cause));
     }
-    // The first part holds the texts; readers look for them there.
-    let moment = Attributes { texts: BTreeMap::new(), ..attributes.clone() };
-    let header_of = |(index, part)| header(set, part, if index == 0 { attributes } else { &moment }, options);
+    let header_of = |(index, part): (usize, &Part<'_>)| {
+        // Readers look for texts in the first part, but for those of a cryptomatte in the part of each of its layers.
+        let texts = if index == 0 { attributes.texts.clone() } else { matte_texts(part, &attributes.texts) };
+        header(set, part, &Attributes { texts, ..attributes.clone() }, options)
+    };
     let headers: Result<exr::meta::Headers> = parts.iter().enumerate().map(header_of).collect();
     let headers = headers.map_err(|error| error.within(path.display()))?;
     atomic::write(path, |file| {
@@ -131,6 +133,18 @@ fn parts(set: &LayerSet, options: Options) -> Vec<Part<'_>> {
 fn part_name(layer: &str, channel: &str) -> String {
     let name = channel.rsplit_once('.').map_or(layer, |(name, _)| name);
     if name.is_empty() { "beauty".into() } else { name.into() }
+}
+
+/// The texts about the cryptomatte that a part belongs to: those whose keys share the beginning of the key whose text is
+/// the name of the part without its number.
+fn matte_texts(part: &Part<'_>, texts: &BTreeMap<String, String>) -> BTreeMap<String, String> {
+    let matte = part.name.trim_end_matches(|c: char| c.is_ascii_digit());
+    let beginning = |(key, name): (&String, &String)| {
+        key.strip_suffix("name").filter(|key| key.starts_with("cryptomatte/") && name == matte).map(str::to_owned)
+    };
+    let beginnings: Vec<String> = texts.iter().filter_map(beginning).collect();
+    let of_matte = |(key, _): &(&String, &String)| beginnings.iter().any(|beginning| key.starts_with(beginning));
+    texts.iter().filter(of_matte).map(|(key, text)| (key.clone(), text.clone())).collect()
 }
 
 /// Source of the values of one channel of the EXR.
