@@ -84,9 +84,11 @@ fn frames_have_different_seeds_by_default() {
         assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
         outcome.stderr
     };
-    let still = run("--frames 7-8 --seed 10 -o vary.#.exr");
-    assert!(still.contains("nothing in the scene is animated: its frames are all the same"), "{still}");
-    run("--frames 7-8 --seed 10 --frame-seed same -o same.#.exr");
+    for frame in [7, 8] {
+        let still = run(&format!("--frames {frame} --seed 10 -o vary.#.exr"));
+        assert!(still.contains("nothing in the scene is animated: its frames are all the same"), "{still}");
+        run(&format!("--frames {frame} --seed 10 --frame-seed same -o same.#.exr"));
+    }
     run("--seed 17 -o seed17.exr");
     run("--seed 10 -o seed10.exr");
     let noisy = |name: &str| values(&folder.read(name).0, "Noisy");
@@ -95,6 +97,29 @@ fn frames_have_different_seeds_by_default() {
     assert_eq!(noisy("same.7.exr"), noisy("seed10.exr"));
     assert_eq!(noisy("same.7.exr"), noisy("same.8.exr"));
     assert_eq!(folder.read("vary.7.exr").1["seed"], 17);
+}
+
+/// A scene in which nothing moves has one picture: it has no animation, or its animation holds still.
+#[test]
+fn frames_of_a_scene_at_rest_are_rendered_once() {
+    let folder = folder();
+    let moving = std::fs::read_to_string(folder.path("moving.gltf")).expect("it is there");
+    let mut resting: Value = serde_json::from_str(&moving).expect("it is JSON");
+    // Both keys have the first value.
+    resting["accessors"][2]["count"] = 1.into();
+    resting["accessors"][1]["count"] = 1.into();
+    std::fs::write(folder.path("resting.gltf"), resting.to_string()).expect("it can be written");
+    for (scene, first) in [("scene.glb", "a.3.exr"), ("resting.gltf", "b.3.exr")] {
+        let output = &first[..1];
+        let line = format!("render {scene} --frames 3-9,2 -o {output}.#.exr {SMALL} --skip-existing --progress plain");
+        let outcome = folder.run(&line);
+        assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+        let warning = format!("{scene}: nothing moves, so its frames are all the same: only frame 3 is rendered\n");
+        assert!(outcome.stderr.starts_with(&format!("warning: {warning}")), "{}", outcome.stderr);
+        assert!(folder.run(&line).stderr.contains(&format!("{first} is there\n")));
+        let rendered = folder.files().into_iter().filter(|name| name.starts_with(output)).collect::<Vec<_>>();
+        assert_eq!(rendered, [first]);
+    }
 }
 
 /// A scene can be a sequence of files, one per frame, as our exporter for Blender writes them.

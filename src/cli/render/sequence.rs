@@ -8,6 +8,7 @@ use crate::cli::signals::Interrupt;
 use crate::cli::{events, say};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::options::{FrameSeed, Frames, is_pattern, path_of_frame};
+use caustique::scene::{gltf, usd};
 use serde_json::json;
 
 /// Renders the frames in order. Ends at the first frame that fails, as Blender does; the frames before it are written.
@@ -16,6 +17,7 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
     args.picture_request()?;
     check(args, frames)?;
     check_temporal(args)?;
+    let frames = if nothing_moves(args, frames) { first_alone(args, frames) } else { frames };
     let count = frames.iter().len();
     for (before, frame) in frames.iter().enumerate() {
         let mut one = args.at(frame);
@@ -84,6 +86,21 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
         progress: args.progress,
     };
     finish.run()
+}
+
+/// Whether all of several frames show the same. The temporal finish averages frames, so it takes all of them.
+fn nothing_moves(args: &RenderArgs, frames: Frames) -> bool {
+    let scene = &args.options.scene;
+    let is_one_file = !is_pattern(&scene.path) && !usd::is_stage(&scene.path);
+    frames.single().is_none() && !args.temporal && is_one_file && gltf::is_still(&scene.path, &scene.request().options)
+}
+
+/// The first of the frames, and a warning that the others are not rendered.
+fn first_alone(args: &RenderArgs, frames: Frames) -> Frames {
+    let first = frames.iter().next().unwrap_or_default();
+    let scene = args.options.scene.path.display();
+    say(&format!("warning: {scene}: nothing moves, so its frames are all the same: only frame {first} is rendered"));
+    Frames::one(first)
 }
 
 /// Whether the output of the frame exists. Files are replaced atomically, so an existing file is complete, unless it is

@@ -71,6 +71,14 @@ impl Tracks {
         Ok(Tracks { list, frame, instant: instant(options.shutter.or(own)) })
     }
 
+    /// Whether every frame has the same values.
+    ///
+    /// # Errors
+    /// The keys of the scene are malformed.
+    pub(super) fn are_still(&self, document: &Document) -> Result<bool> {
+        Ok(scene_extras(document)?.time.is_some() || self.list.iter().all(|track| track.curve.is_constant()))
+    }
+
     /// Whether nothing is animated.
     pub(super) fn is_empty(&self) -> bool {
         self.list.is_empty()

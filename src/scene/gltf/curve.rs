@@ -72,6 +72,17 @@ impl Curve {
         f64::from(self.times[0])
     }
 
+    /// Whether the value is the same at all times.
+    pub(super) fn is_constant(&self) -> bool {
+        let slots = self.interpolation.slots();
+        let first = self.value(0);
+        let is_flat = |key: usize| {
+            let tangents = (0..slots).filter(|slot| *slot != slots / 2).flat_map(|slot| self.slot(key, slot));
+            self.value(key) == first && (self.times.len() == 1 || tangents.into_iter().all(|x| x == 0.0))
+        };
+        (0..self.times.len()).all(is_flat)
+    }
+
     /// The curve's value at a time (seconds), clamped to the first and last key. `rotation`: values are unit
     /// quaternions.
     pub(super) fn value_at(&self, time: f64, rotation: bool) -> Vec<f64> {

@@ -166,6 +166,22 @@ pub struct MovingFile {
     meshes: Vec<Arc<Mesh>>,
 }
 
+/// Whether all frames of a file are the same: it has no animation, or its animations move nothing. `false` if the file
+/// cannot be read, which its render reports.
+pub fn is_still(path: &Path, options: &ReadOptions) -> bool {
+    let still = |bytes: Vec<u8>| {
+        let mut document = document::Document::parse(
+            &bytes,
+            crate::scene::folder::Folder::of(path, options.allow_outside),
+            &mut Vec::new(),
+        )?;
+        choice::apply(&mut document, options)?;
+        let tracks = animation::Tracks::read(&document, options, &mut Vec::new())?;
+        tracks.are_still(&document)
+    };
+    std::fs::read(path).is_ok_and(|bytes| still(bytes).unwrap_or(false))
+}
+
 impl MovingFile {
     /// Reads a scene file, and keeps it for other moments if something moves while the shutter is open, or if something is
     /// animated and motion vectors are to be computed.
