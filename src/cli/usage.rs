@@ -30,10 +30,9 @@ const FOREIGN_OPTIONS: [(&[&str], &str, &str); 16] = [
     ),
     (&["--frame", "-f"], "frames", "--frames A-B renders frames of the scene's animation, one frame as --frames A"),
     (
-        &["--motion-blur", "--shutter"],
-        "frames",
-        "nothing is blurred by motion: render moments between the frames (--frame-rate 240 has ten of them to a frame of 24) \
-         and take their mean",
+        &["--motion-blur", "--motionblur"],
+        "shutter",
+        "--shutter OPEN,CLOSE blurs what moves while the shutter is open, in frames from the frame: --shutter -0.25,0.25",
     ),
     (&["--quiet", "--silent", "-q"], "progress", "--progress none says nothing but warnings and errors"),
     (&["--denoiser", "--no-denoise"], "denoise", "--denoise auto|oidn|own|none chooses the denoiser"),

@@ -34,6 +34,8 @@ pub trait Ranged {
     fn whole<T>(self, range: RangeInclusive<T>) -> Self
     where
         T: FromStr + PartialOrd + Display + Clone + Send + Sync + 'static;
+    /// Makes the option take a time above zero in seconds ([`duration`]).
+    fn seconds(self, above: f64) -> Self;
     /// Makes the option take a finite number in a range.
     fn between(self, range: (Bound<f64>, Bound<f64>)) -> Self;
 }
@@ -46,6 +48,11 @@ impl Ranged for Arg {
         let number = |end: &T| end.to_string().parse().ok();
         let described = ValueRange { min: number(range.start()), max: number(range.end()), ..ValueRange::default() };
         self.value_parser(whole(range)).add(described)
+    }
+
+    fn seconds(self, above: f64) -> Arg {
+        let described = ValueRange { min: Number::from_f64(above), above_min: true, ..ValueRange::default() };
+        self.value_parser(duration).add(described)
     }
 
     fn between(self, (low, high): (Bound<f64>, Bound<f64>)) -> Arg {
@@ -117,6 +124,23 @@ pub fn positive(text: &str) -> Result<f64, String> {
     between(Excluded(0.0), Unbounded)(text)
 }
 
+/// Parses a time above zero: seconds, or numbers with units as in `1h30m`, `5m` and `60s`. Returns seconds.
+pub fn duration(text: &str) -> Result<f64, String> {
+    let mut rest = text.trim();
+    if !rest.ends_with(['h', 'm', 's']) {
+        return positive(rest);
+    }
+    let expected = "it must be a time, such as 90, 90s, 5m or 1h30m";
+    let mut seconds = 0.0;
+    for (unit, length) in [('h', 3600.0), ('m', 60.0), ('s', 1.0)] {
+        if let Some((number, after)) = rest.split_once(unit) {
+            seconds += length * between(Included(0.0), Unbounded)(number).map_err(|_| expected)?;
+            rest = after;
+        }
+    }
+    if rest.is_empty() { positive(&seconds.to_string()) } else { Err(expected.into()) }
+}
+
 /// Makes a parser of whole numbers in a range.
 pub fn whole<T>(range: RangeInclusive<T>) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync
 where
@@ -181,6 +205,18 @@ mod tests {
         assert_eq!(relative_error("1"), Err("it must be in (0, 1)".into()));
         assert_eq!(threads("1024"), Ok(1024));
         assert_eq!(threads("-1"), Err("it must be a whole number from 0 to 1024".into()));
+    }
+
+    #[test]
+    fn times_have_units() {
+        for (text, seconds) in
+            [("90", 90.0), ("0.5", 0.5), ("60s", 60.0), ("5m", 300.0), ("1h30m", 5400.0), ("1h 2.5s", 3602.5)]
+        {
+            assert_eq!(duration(text), Ok(seconds), "{text}");
+        }
+        for wrong in ["5 minutes", "1m2h", "5mm", "m", "-5m", "5d", "", "1h30", "infs", "0s", "0"] {
+            assert!(duration(wrong).is_err(), "{wrong}");
+        }
     }
 
     #[test]

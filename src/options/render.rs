@@ -27,7 +27,7 @@ use crate::stat::sum::MAX_TERMS;
 use crate::stop::Stop;
 use crate::transport::{Indirect, MAX_LEVELS};
 use serde::Serialize;
-use std::ops::Bound::{Excluded, Included, Unbounded};
+use std::ops::Bound::{Excluded, Included};
 
 /// A picture of a scene, the method, and when to stop.
 #[derive(clap::Args, Clone, Serialize)]
@@ -129,7 +129,7 @@ pub struct RenderOptions {
     pub frame_seed: FrameSeed,
 
     /// Stop after this many seconds; the running iteration is discarded, unless it is the first
-    #[arg(long, value_name = "SECONDS", between = (Excluded(0.0), Unbounded), help_heading = "When to stop")]
+    #[arg(long, value_name = "SECONDS|1h30m", seconds = 0.0, help_heading = "When to stop")]
     pub time: Option<f64>,
     /// Stop after this many iterations [default: 64, if nothing else says when to stop]
     #[arg(long, value_name = "N", whole = 1_u64..=MAX_TERMS, help_heading = "When to stop")]

@@ -7,7 +7,6 @@ use crate::film::{Naming, Selection};
 use crate::pipeline::Saving;
 use crate::pipeline::memory::MemoryLimit;
 use serde::Serialize;
-use std::ops::Bound::{Excluded, Unbounded};
 use std::path::{Path, PathBuf};
 
 /// How a render runs and what its file holds.
@@ -31,7 +30,7 @@ pub struct RunOptions {
     #[arg(hide_short_help = true)]
     pub checkpoint: Option<PathBuf>,
     /// Seconds between two saves
-    #[arg(long, value_name = "SECONDS", default_value_t = 300.0, between = (Excluded(0.0), Unbounded))]
+    #[arg(long, value_name = "SECONDS|5m", default_value_t = 300.0, seconds = 0.0)]
     #[arg(help_heading = "Running")]
     #[serde(skip)]
     #[arg(hide_short_help = true)]

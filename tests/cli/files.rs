@@ -12,6 +12,8 @@ fn without_output_the_picture_is_beside_the_scene() {
     let outcome = folder.render("--iterations 2 --no-finish");
     assert!(outcome.stderr.starts_with("no --output: writing scene.exr and scene.png\n"), "{}", outcome.stderr);
     assert_eq!(folder.files(), ["scene.exr", "scene.png"]);
+    let refused = folder.run("render none.glb");
+    assert!(refused.code != Some(0) && !refused.stderr.contains("no --output"), "{}", refused.stderr);
     folder.render("--iterations 2 --no-finish --frames 3 --png look.####.png");
     assert_eq!(folder.files(), ["look.0003.png", "scene.0003.exr", "scene.exr", "scene.png"]);
 }

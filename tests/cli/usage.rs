@@ -152,7 +152,7 @@ fn errors_name_place_cause_and_remedy() {
         (
             &format!("{render} --time -3"),
             2,
-            "command line: invalid value '-3' for '--time <SECONDS>': it must be above 0",
+            "command line: invalid value '-3' for '--time <SECONDS|1h30m>': it must be above 0",
             help,
         ),
         (

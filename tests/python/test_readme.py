@@ -1,5 +1,6 @@
 """Tests the README and docs/: commands run as written, links and options exist, and lines are short."""
 
+import json
 import re
 import shlex
 import subprocess
@@ -11,6 +12,7 @@ import lab.options
 README = support.ROOT / "README.md"
 DOCS = sorted((support.ROOT / "docs").rglob("*.md"))
 PAGES = [README, *DOCS]
+SERVER = support.ROOT / "docs" / "server.md"
 PROGRAM = "target/release/caustique"
 #: Scripts that set everything up: they exist, but run too long for a test.
 WHOLE = ("./scripts/demo.sh", "./scripts/test.sh", "./scripts/python.sh", "./scripts/package.sh")
@@ -121,6 +123,28 @@ class Commands(support.Scratch):
     def test_commands_of_the_documentation_run(self):
         for page in DOCS:
             self.run_all(page)
+
+
+class Server(unittest.TestCase):
+    def test_the_example_runs_as_written(self):
+        text = "\n".join(line for _, line in split(SERVER)[1] if line.startswith(("{", " "))).strip()
+        said = []
+        while text:
+            command, end = json.JSONDecoder().raw_decode(text)
+            said.append(json.dumps(command) + "\n")
+            text = text[end:].strip()
+        self.assertGreater(len(said), 2)
+        command = [support.binary(), "serve", "--threads", "1"]
+        with subprocess.Popen(command, cwd=support.ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as server:
+            server.stdin.write("".join(said).encode())
+            server.stdin.flush()
+            events = []
+            while not {"edited", "error"} & set(events):
+                answer = json.loads(server.stdout.readline())
+                events.append(answer["event"])
+                server.stdout.read(answer.get("bytes", 0))
+            server.stdin.close()
+        self.assertEqual((events[:2], events[-1]), (["ready", "loaded"], "edited"), answer)
 
 
 class Text(unittest.TestCase):

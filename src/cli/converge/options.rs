@@ -45,7 +45,7 @@ pub struct ConvergeArgs {
     #[arg(long = "with", value_enum, value_name = "LIST", value_delimiter = ',', help_heading = "Runs")]
     pub with: Vec<Renderer>,
     /// Stop each run after this many seconds of its own [default: 60, without --iterations]
-    #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "When to stop")]
+    #[arg(long, value_name = "SECONDS|1h30m", seconds = 0.0, help_heading = "When to stop")]
     pub time: Option<f64>,
     /// Stop each run after this many iterations
     #[arg(long, value_name = "N", whole = 1_u64..=MAX_TERMS, help_heading = "When to stop")]
@@ -79,7 +79,7 @@ pub struct ConvergeArgs {
     #[arg(long, value_enum, value_name = "METHOD", conflicts_with = "reference", help_heading = "Error")]
     pub reference_method: Option<MethodChoice>,
     /// Seconds for a reference rendered here, both halves together [default: 8 times --time]
-    #[arg(long, value_name = "SECONDS", value_parser = positive, conflicts_with = "reference", help_heading = "Error")]
+    #[arg(long, value_name = "SECONDS|1h30m", seconds = 0.0, conflicts_with = "reference", help_heading = "Error")]
     pub reference_time: Option<f64>,
     /// Iterations of each half of a reference rendered here [default: 16 times --iterations, without --time]
     #[arg(long, value_name = "N", whole = 2_u64..=MAX_TERMS, conflicts_with = "reference", help_heading = "Error")]

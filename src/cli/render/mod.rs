@@ -31,11 +31,7 @@ pub use summary::{Summary, place, print_finish, print_picture, warn_unseen};
 
 /// Renders a scene, or frames of its animation, as `caustique render`.
 pub fn run(args: &RenderArgs) -> Result<()> {
-    let named = args.with_outputs();
-    if let (false, true, Some(png)) = (args.has_output(), args.progress.for_people(), &named.picture.png) {
-        say(&format!("no --output: writing {} and {}", named.output.display(), png.display()));
-    }
-    let args = &named;
+    let args = &args.with_outputs();
     super::pool(args.run.threads)?.install(|| match args.options.scene.frames {
         Some(frames) => sequence::run(args, frames),
         None => {
@@ -114,6 +110,7 @@ struct Reports<'a> {
 
 impl Observer for Reports<'_> {
     fn accept(&mut self, scene: &Scene) -> Result<()> {
+        self.announce_default_names();
         scene::print_warnings(&self.args.options.scene, &scene.warnings)?;
         self.made_for = scene.picture;
         self.interrupt = if self.control.is_none() { Some(Interrupt::install()?) } else { None };
@@ -184,6 +181,16 @@ impl<'a> Reports<'a> {
             estimate: None,
             reason_if_black: String::new(),
             made_for: PictureDefaults::default(),
+        }
+    }
+
+    /// Tells people once which files are written if they name none, after all that could be wrong with the scene.
+    fn announce_default_names(&self) {
+        let is_first = self.turn.is_none_or(|turn| turn.before == 0);
+        if let (Some(png), true) = (&self.args.picture.png, self.args.names_are_default && is_first)
+            && self.args.progress.for_people()
+        {
+            say(&format!("no --output: writing {} and {}", self.args.output.display(), png.display()));
         }
     }
 

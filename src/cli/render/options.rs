@@ -80,6 +80,10 @@ pub struct RenderArgs {
     #[arg(long, value_enum, default_value_t = Form::Auto, help_heading = "Running")]
     #[serde(skip)]
     pub progress: Form,
+    /// Whether the outputs have their default names, of which the user is told.
+    #[arg(skip)]
+    #[serde(skip)]
+    pub names_are_default: bool,
 }
 
 impl RenderArgs {
@@ -126,6 +130,7 @@ impl RenderArgs {
             let beside = |kind| scene.path.with_extension(format!("{number}{kind}"));
             args.output = beside("exr");
             args.picture.png.get_or_insert_with(|| beside("png"));
+            args.names_are_default = true;
         }
         args
     }

@@ -78,6 +78,10 @@ fn open<T>(path: &Path, decode: impl FnOnce(BufReader<File>, u64) -> Outcome<T>)
         exr::error::Error::NotSupported(cause) => {
             Error::new(ErrorKind::Image, path.display(), cause).hint("save it as a flat EXR with ZIP compression")
         }
+        exr::error::Error::Invalid(cause) if cause == "file identifier missing" => {
+            Error::new(ErrorKind::Image, path.display(), "not a valid EXR: it does not begin as one")
+                .hint("give the EXR of the render; a PNG is tone-mapped, for viewing only")
+        }
         other => Error::new(ErrorKind::Image, path.display(), format!("not a valid EXR: {other}")),
     })
 }

@@ -40,6 +40,9 @@ const SUPPORTED: [&str; 27] = [
     "KHR_texture_transform",
 ];
 
+/// The first bytes of an EXR.
+const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+
 /// Names of the extension for buffer views that meshoptimizer has compressed.
 pub(super) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 
@@ -59,7 +62,12 @@ pub(super) fn split(bytes: &[u8]) -> Result<(Value, &[u8])> {
     let (json, binary) = if bytes.starts_with(b"glTF") { chunks(bytes)? } else { (bytes, &[][..]) };
     let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
     if json.iter().find(|b| !b.is_ascii_whitespace()) != Some(&b'{') {
-        return Err(fault("", "this is not a glTF file").hint("give a .glb or .gltf file"));
+        let hint = if bytes.starts_with(&EXR_MAGIC) {
+            "it is an EXR, a picture: 'caustique info' describes it; give the .glb or .gltf file of its scene"
+        } else {
+            "give a .glb or .gltf file"
+        };
+        return Err(fault("", "this is not a glTF file").hint(hint));
     }
     let mut value = serde_json::from_slice(json).map_err(|e| fault("JSON", e).hint(DAMAGED))?;
     unify_integers(&mut value);

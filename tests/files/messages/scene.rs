@@ -464,7 +464,7 @@ fn windings() -> [(&'static str, Vec<u32>); 3] {
     ]
 }
 
-fn containers() -> [(&'static str, Vec<u8>); 8] {
+fn containers() -> [(&'static str, Vec<u8>); 9] {
     let whole = pool().bytes();
     let with = |at: usize, byte: u8| {
         let mut bytes = whole.clone();
@@ -474,6 +474,7 @@ fn containers() -> [(&'static str, Vec<u8>); 8] {
     [
         ("no bytes", Vec::new()),
         ("another kind of file", b"\x89PNG\r\n".to_vec()),
+        ("a picture", b"\x76\x2f\x31\x01\x02".to_vec()),
         ("the head alone", whole[..9].to_vec()),
         ("half a file", whole[..whole.len() / 2].to_vec()),
         ("version 1", with(4, 1)),

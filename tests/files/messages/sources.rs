@@ -82,7 +82,14 @@ const UNSAID: [(&str, &[&str]); 7] = [
     ),
     (
         "they are no messages",
-        &["caustique checkpoint 7n", "caustique checkpoint ", "not said", "default material", "xabKTX 20xbbrnx1an"],
+        &[
+            "caustique checkpoint 7n",
+            "caustique checkpoint ",
+            "file identifier missing",
+            "not said",
+            "default material",
+            "xabKTX 20xbbrnx1an",
+        ],
     ),
 ];
 
