@@ -3,8 +3,8 @@
 #
 #   scripts/python.sh          the wheel, into target/wheels, into .venv-python and, alone, into .venv-wheel
 #
-# The wheel contains no Embree, Open Image Denoise or ONNX Runtime: the package finds them at run time, as the program
-# does.
+# The wheel contains the program, for the command `caustique`, but no Embree, Open Image Denoise or ONNX Runtime: the
+# package and the program find them at run time.
 
 set -euo pipefail
 
@@ -13,8 +13,15 @@ set -euo pipefail
 
 setup wheel
 cd "$ROOT"
-wheels=$(realpath -m "${CARGO_TARGET_DIR:-target}/wheels")
+target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
+wheels=$target/wheels
 rm -rf "$wheels"
+# maturin packs all files of the package's folder.
+cargo build --quiet --locked --release --workspace
+program=ffi/python/caustique/bin
+trap 'rm -rf "$program"' EXIT
+mkdir -p "$program"
+cp "$target/release/caustique" "$program/"
 # In the profile and folder of `cargo build --workspace`, whose compiled crates are reused.
 .venv-python/bin/maturin build --quiet --release --locked --manifest-path ffi/python/Cargo.toml --compatibility linux \
     --interpreter .venv-python/bin/python --out "$wheels"

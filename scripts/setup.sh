@@ -7,6 +7,7 @@
 #   scripts/setup.sh wheel     render, and packages to build and test the Python package in .venv-python
 #   scripts/setup.sh package   a linker, and packages that build portable packages in .venv-package
 #   scripts/setup.sh usd       render, and packages to read USD stages in .venv-usd
+#   scripts/setup.sh bpy       Blender as a Python module in .venv-bpy, for scripts/blender without an installed Blender
 #   scripts/setup.sh test      python, wheel and usd, and Blender as a Python module in .venv-bpy, .venv-bpy-oldest and
 #                              .venv-bpy-newest
 #   scripts/setup.sh farm      python, and packages of scripts/farm in .venv-farm: Ray, Open Job Description
@@ -283,12 +284,18 @@ need_blender() {
         fail "Blender's Python module lacks libraries: $(missing_libraries "$module")" "install the packages that hold them"
 }
 
-# setup render|python|wheel|package|usd|test|farm|train
+# setup render|python|wheel|package|usd|bpy|test|farm|train
 setup() {
     case $1 in
-    render | python | wheel | package | usd | test | farm | train) ;;
-    *) fail "unknown mode '$1'" "one of: render python wheel package usd test farm train" ;;
+    render | python | wheel | package | usd | bpy | test | farm | train) ;;
+    *) fail "unknown mode '$1'" "one of: render python wheel package usd bpy test farm train" ;;
     esac
+    if [ "$1" = bpy ]; then
+        need_python
+        need_venv_module
+        need_bpy
+        return
+    fi
     need_rust
     need_linker
     need_python

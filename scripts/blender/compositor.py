@@ -18,7 +18,7 @@ try:
     import bpy
 except ModuleNotFoundError as error:
     sys.exit(f"error: {error}\nhint: run this in Blender (blender -b --python compositor.py -- PICTURE.exr OUT.blend), or "
-             "in a Python that has bpy, such as the .venv-bpy/bin/python that 'scripts/setup.sh test' makes")
+             "in a Python that has bpy, such as the .venv-bpy/bin/python that 'scripts/setup.sh bpy' makes")
 
 PARTS = ("CombinedDirect", "CombinedIndirect", "CombinedEmission", "CombinedVolume")
 CAUSTIC = "CombinedCaustic"

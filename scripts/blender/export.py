@@ -33,7 +33,7 @@ try:
     import bpy  # first: it makes numpy importable
 except ModuleNotFoundError as error:
     sys.exit(f"error: {error}\nhint: run this in Blender (blender -b IN.blend --python export.py -- OUT.glb), or in a "
-             "Python that has bpy, such as the .venv-bpy/bin/python that 'scripts/setup.sh test' makes")
+             "Python that has bpy, such as the .venv-bpy/bin/python that 'scripts/setup.sh bpy' makes")
 
 import numpy
 

@@ -129,6 +129,13 @@ class Blender(unittest.TestCase):
             self.assertRegex(done.stderr, r"^error: No module named 'bpy'\nhint: run this in Blender .*\n$")
 
 
+    def test_setup_installs_bpy_alone(self):
+        """Without Rust: its mode needs a Python and Blender's module, and nothing of the program."""
+        script = 'PATH=/usr/bin:/bin; . scripts/setup.sh; for need in $(compgen -A function need_); do eval "$need() { echo $need; }"; done; setup bpy'
+        done = subprocess.run(["bash", "-c", script], cwd=support.ROOT, capture_output=True, text=True, check=True)
+        self.assertEqual(done.stdout.split(), ["need_python", "need_venv_module", "need_bpy"])
+
+
 class Requirements(unittest.TestCase):
     def test_all_are_pinned_by_hash(self):
         """Each requirement and its dependencies are in the pinned file (scripts/lock.sh)."""

@@ -4,7 +4,7 @@ Lengths are metres, angles degrees, colours scene-linear Rec. 709; the world is 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,8 +12,29 @@ from numpy.typing import ArrayLike
 Triple = Sequence[float]
 
 
+@dataclass(kw_only=True, eq=False)
+class Described:
+    """What the classes below share: numbers and triples of numbers are checked where they are given."""
+
+    def __post_init__(self):
+        for item in fields(self):
+            value = getattr(self, item.name)
+            for kind, shape, expected in ((float, (), "a number"), (Triple, (3,), "three numbers")):
+                if item.type is kind and not _are_numbers(value, shape):
+                    raise TypeError(f"{type(self).__name__}: {item.name} is {expected}, not {value!r}")
+
+
+def _are_numbers(value, shape: tuple) -> bool:
+    """Whether a value is an array of numbers of this shape; () is a single number."""
+    try:
+        array = np.asarray(value)
+    except ValueError:  # Its rows differ in length.
+        return False
+    return array.shape == shape and (array.dtype == bool or np.issubdtype(array.dtype, np.number))
+
+
 @dataclass(kw_only=True)
-class Medium:
+class Medium(Described):
     """A homogeneous medium, such as water or fog, that absorbs and scatters light."""
 
     #: Absorption coefficient, 1/m, per channel.
@@ -25,7 +46,7 @@ class Medium:
 
 
 @dataclass(kw_only=True, eq=False)
-class Texture:
+class Texture(Described):
     """An image on a surface, with its placement: (u, v) looks up offset + rotation * (scale * (u, v))."""
 
     #: (H, W, 3) or (H, W, 4) uint8, the top row first.
@@ -43,7 +64,7 @@ class Texture:
 
 
 @dataclass(kw_only=True, eq=False)
-class Material:
+class Material(Described):
     """A surface with the parameters of glTF. The default is matte white."""
 
     name: str = "material"
@@ -123,7 +144,7 @@ class Material:
 
 
 @dataclass(kw_only=True, eq=False)
-class Mesh:
+class Mesh(Described):
     """A triangle mesh of one material. Meshes of the same arrays and material become instances of one mesh."""
 
     #: Positions (V, 3), m.
@@ -145,7 +166,7 @@ class Mesh:
 
 
 @dataclass(kw_only=True, eq=False)
-class Camera:
+class Camera(Described):
     """A perspective camera, or an orthographic one."""
 
     position: Triple = (0.0, 0.0, 1.0)
@@ -168,7 +189,7 @@ class Camera:
 
 
 @dataclass(kw_only=True, eq=False)
-class PointLight:
+class PointLight(Described):
     """A light that is equally bright in all directions."""
 
     position: Triple
@@ -181,7 +202,7 @@ class PointLight:
 
 
 @dataclass(kw_only=True, eq=False)
-class SpotLight:
+class SpotLight(Described):
     """A light that emits into a cone."""
 
     position: Triple
@@ -199,7 +220,7 @@ class SpotLight:
 
 
 @dataclass(kw_only=True, eq=False)
-class SunLight:
+class SunLight(Described):
     """A light from infinity."""
 
     #: Direction in which the light travels.

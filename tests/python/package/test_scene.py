@@ -450,6 +450,14 @@ class Faults(unittest.TestCase):
                 cq.Scene.from_meshes([cq.Mesh(**{"vertices": vertices, "triangles": triangles} | arrays)])
         with self.assertRaises(cq.Error):
             cq.Scene.from_meshes([cq.Mesh(vertices=vertices * np.nan, triangles=triangles)])
+        for made, text in [
+            (lambda: cq.Material(ior="glass"), "Material: ior is a number, not 'glass'"),
+            (lambda: cq.Material(base_color=0.5), "Material: base_color is three numbers, not 0.5"),
+            (lambda: cq.Medium(sigma_s=(1.0, "a", 1.0)), "Medium: sigma_s is three numbers"),
+            (lambda: cq.SunLight(direction=(0, 1), irradiance=np.ones(3)), "SunLight: direction is three numbers"),
+        ]:
+            with self.subTest(text), self.assertRaisesRegex(TypeError, text):
+                made()
 
     def test_a_pickled_scene_is_built_again_from_its_source(self):
         """From a path, also in another folder, and from bytes; with the options, arrays among them."""

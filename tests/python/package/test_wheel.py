@@ -31,11 +31,10 @@ class Alone(unittest.TestCase):
         for name in ("LICENSE-MIT", "LICENSE-APACHE"):
             self.assertIn((ROOT / name).read_text(), output)
 
-    def test_its_command_says_where_to_get_the_program(self):
+    def test_its_command_runs_the_program(self):
         for command in ([PYTHON.parent / "caustique"], [PYTHON, "-I", "-m", "caustique"]):
-            done = subprocess.run([*command, "--version"], capture_output=True, text=True, check=False)
-            self.assertEqual(done.returncode, 1)
-            self.assertRegex(done.stderr, "this package does not contain the program\nhint: install a wheel")
+            done = subprocess.run([*command, "plan", TORUS], capture_output=True, text=True, check=False)
+            self.assertEqual((done.returncode, done.stdout.splitlines()[0].split(":")[0]), (0, str(TORUS)), done.stderr)
 
     def test_it_renders_far_from_its_sources(self):
         with tempfile.TemporaryDirectory() as folder:
