@@ -100,14 +100,14 @@ impl Search {
             (Effect::Environment | Effect::Alpha | Effect::Textures | Effect::Dispersion, _) => "all paths",
             (Effect::Volume, _) if !media_scatter => "all paths",
             (_, Search::LightPaths) => "light paths",
-            (Effect::Glossy, Search::Photons | Search::PathsAndPhotons) if shared => "eye paths and photons",
-            (Effect::Emission | Effect::Glossy | Effect::DepthOfField, _) => "eye paths",
+            (Effect::Glossy, Search::Photons | Search::PathsAndPhotons) if shared => "camera paths and photons",
+            (Effect::Emission | Effect::Glossy | Effect::DepthOfField, _) => "camera paths",
             (Effect::Direct, Search::CameraPaths | Search::PathsAndPhotons | Search::Map | Search::Photons) => {
                 "connections to lights"
             }
             (Effect::Volume, Search::ConnectionsAndMerging) => "connections",
             (Effect::Caustic | Effect::Sds, Search::ConnectionsAndMerging | Search::PathsAndPhotons) => "photons",
-            _ if walks => "eye paths",
+            _ if walks => "camera paths",
             (_, Search::Merging) => "photons",
             _ if gathers => "photons",
             (_, Search::Connections) => "connections",

@@ -9,7 +9,7 @@ fn the_plan_of_a_small_scene_is_printed_word_for_word() {
     let outcome = folder.run("plan scene.glb --method bdpt --env 0.5,0.5,0.5 --effects -textures,+alpha");
     let table = r#"scene.glb: bdpt, asked for
   effect          simulated by  because
-  emission        eye paths     the environment
+  emission        camera paths  the environment
   direct          connections   light "Lamp"
                                 the environment
   indirect        connections   "Floor", "Mirror" under light "Lamp", the environment

@@ -78,13 +78,13 @@ fn photons_carry_gloss_only_of_lamps_behind_glass_or_mirrors() {
     let brushed = Material { roughness: 0.3, ..mirror() };
     let varnished = Material { clearcoat: 1.0, clearcoat_roughness: 0.1, ..matte(0.5, 0.0) };
     let frosted = Material { roughness: 0.2, ..glass(1.5) };
-    let both = Some("eye paths and photons");
+    let both = Some("camera paths and photons");
     assert_eq!([&brushed, &varnished].map(|shining| by(true, glass(1.5), shining.clone())), [both; 2]);
-    let eye_paths = Some("eye paths");
-    assert_eq!(by(false, glass(1.5), brushed.clone()), eye_paths);
-    assert_eq!(by(true, frosted, brushed.clone()), eye_paths);
-    assert_eq!(by(true, matte(0.5, 0.0), brushed), eye_paths);
-    assert_eq!(by(true, glass(1.5), Material { clearcoat: 1.0, ..mirror() }), eye_paths);
+    let camera_paths = Some("camera paths");
+    assert_eq!(by(false, glass(1.5), brushed.clone()), camera_paths);
+    assert_eq!(by(true, frosted, brushed.clone()), camera_paths);
+    assert_eq!(by(true, matte(0.5, 0.0), brushed), camera_paths);
+    assert_eq!(by(true, glass(1.5), Material { clearcoat: 1.0, ..mirror() }), camera_paths);
 }
 
 #[test]
