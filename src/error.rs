@@ -1,6 +1,6 @@
 //! Errors as data: what kind, where, what is wrong, and what to do about it.
 //!
-//! The library never prints and never exits; `main` turns an [`Error`] into two lines on stderr
+//! The library never prints and never exits; the command line turns an [`Error`] into two lines on stderr
 //! (`place: cause`, then `hint: remedy`) and an exit code.
 
 use std::fmt;

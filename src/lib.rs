@@ -17,6 +17,8 @@ pub mod stop;
 
 pub mod temporary;
 
+pub mod limits;
+
 pub mod math;
 
 pub mod random;

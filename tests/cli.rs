@@ -39,6 +39,8 @@ mod rejected;
 mod running;
 #[path = "cli/serve.rs"]
 mod serve;
+#[path = "cli/stated_limits.rs"]
+mod stated_limits;
 #[path = "cli/temporal.rs"]
 mod temporal;
 #[path = "cli/usage.rs"]

@@ -5,6 +5,7 @@ use caustique::estimator::QUARTERS;
 use caustique::film::cryptomatte::RANKS;
 use caustique::film::kind::{LAYERS, LayerKind, Suffix};
 use caustique::film::{describe, finished_part, part_names};
+use caustique::limits::{LIMITS, Limit};
 use caustique::render::Method;
 use caustique::transport::MAX_LEVELS;
 use serde_json::{Value, json};
@@ -112,4 +113,25 @@ fn the_page_for_compositors_lists_all_layers() {
         }
     }
     compare_part("docs/compositors.md", "layers", &text);
+}
+
+/// The items of a list, wrapped to lines of at most 120 characters.
+fn list<'a>(limits: impl Iterator<Item = &'a Limit>, of_pages: &str) -> String {
+    let item = |limit: &Limit| {
+        let mut lines = vec![String::from("-")];
+        for word in limit.sentence.replace("](", &format!("]({of_pages}")).split(' ') {
+            if lines.last().is_some_and(|line| line.len() + word.len() >= 120) {
+                lines.push(String::from(" "));
+            }
+            lines.last_mut().into_iter().for_each(|line| *line += &format!(" {word}"));
+        }
+        lines.join("\n") + "\n"
+    };
+    limits.map(item).collect()
+}
+
+#[test]
+fn the_readme_and_the_guide_list_the_limits() {
+    compare_part("README.md", "limits", &list(LIMITS.iter().filter(|limit| limit.in_readme), "docs/"));
+    compare_part("docs/guide.md", "limits", &list(LIMITS.iter(), ""));
 }

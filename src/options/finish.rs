@@ -1,4 +1,4 @@
-//! Options of the finish, which `render`, `combine` and `converge` have in common.
+//! Options of the finish, which `render`, `finish`, `merge` and `converge` have in common.
 
 use crate::finish::DenoiserChoice;
 use crate::pipeline::FinishRequest;

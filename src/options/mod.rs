@@ -1,5 +1,5 @@
-//! The options of a render. Each is defined once, with its name, default, unit, range, help and the methods that take
-//! it.
+//! The options of a render. Each is defined once, with its name, default, unit, range and help; `check` says which methods
+//! take it.
 //!
 //! The command line parses these types. Python's keyword arguments are turned into command-line arguments and parsed by
 //! [`parse`]. [`catalogue`] describes the options for generated files: the add-on's panel, the options in a USD stage,

@@ -9,6 +9,13 @@ pub fn write(path: &Path, lamp: bool) {
     std::fs::write(path, bytes(lamp.then_some(LAMP), &extras)).expect("the scene can be written");
 }
 
+/// Writes the scene with the lamp after a change of its document.
+pub fn write_edited(path: &Path, edit: impl FnOnce(&mut Value)) {
+    let (mut document, binary) = parts(Some(LAMP), &json!({"light_units": "radiometric"}));
+    edit(&mut document);
+    std::fs::write(path, chunks(&document, &binary)).expect("the scene can be written");
+}
+
 /// Writes the scene with a lamp just above the floor, so strong that its light there overflows f32.
 pub fn write_blinding(path: &Path) {
     let extras = json!({"light_units": "radiometric"});
