@@ -4,7 +4,7 @@ use super::pilot_settings::{EFFECTS_PHOTON_SHARE, pilot_settings};
 use super::weights::{self, WeighedEffect};
 use crate::camera::Camera;
 use crate::plan::{Effect, Presence};
-use crate::render::{Candidate, Cost, Counts, Method, Proxy, Settings};
+use crate::render::{Candidate, Cost, Counts, DEFAULT_ITERATIONS, Method, Proxy, Settings};
 use crate::scene::{Scene, View};
 
 /// Share of the render's work that the pilot (a proxy render in a small picture) and the measurement of effects may take
@@ -53,7 +53,8 @@ const CHEAPER: [Counts; 6] = [
     Counts { light_paths: 1, connections: 0, merging: 1.0 },
     Counts::PATHS,
 ];
-/// Core-seconds that a render without limits of time and iterations counts as.
+/// Most core-seconds that a render without limits of time and iterations counts as. It counts as one of
+/// [`DEFAULT_ITERATIONS`] iterations, because the work until a target error is unknown.
 const UNLIMITED_CORE_SECONDS: f64 = 1000.0;
 
 /// Numbers of samples that are compared: each number of light paths with each number of connections, with and without
@@ -123,18 +124,19 @@ impl<'a> Pilot<'a> {
     pub fn new(view: View<'a>, gathering: &'a Settings) -> Pilot<'a> {
         let pixels = pixel_count(view.camera);
         let cost = Cost::count(view.scene, view.camera, gathering, None);
+        let seconds = |candidate: Candidate| {
+            let settings = Settings { method: candidate.method, ..gathering.clone() };
+            cost.iteration_seconds(candidate, &settings, pixels)
+        };
+        let longest = MAX_COST_RATIO * seconds(Candidate::CAMERA_PATHS);
+        let work = |n: u64| n as f64 * seconds(Candidate::DEFAULT).min(longest);
         let budget = match (gathering.iterations, gathering.time) {
             (Some(n), time) => {
-                let seconds = |candidate: Candidate| {
-                    let settings = Settings { method: candidate.method, ..gathering.clone() };
-                    cost.iteration_seconds(candidate, &settings, pixels)
-                };
-                let longest = MAX_COST_RATIO * seconds(Candidate::CAMERA_PATHS);
-                let work = n as f64 * seconds(Candidate::DEFAULT).min(longest);
+                let work = work(n);
                 time.map_or(work, |seconds| work.min(seconds * ASSUMED_CORES))
             }
             (None, Some(seconds)) => seconds * ASSUMED_CORES,
-            (None, None) => UNLIMITED_CORE_SECONDS,
+            (None, None) => work(DEFAULT_ITERATIONS).min(UNLIMITED_CORE_SECONDS),
         };
         Pilot { view, gathering, cost, pixels, budget }
     }

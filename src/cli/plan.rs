@@ -63,7 +63,7 @@ fn report(args: &PlanArgs) -> Result<()> {
     } else {
         let mut text = text(plan, options.scene.verbose);
         if let Some((error, forecast)) = forecast {
-            text += &sentence(error, forecast);
+            text += &sentence(error, forecast, &planned);
         }
         if auto && plan.effects.iter().all(|effect| effect.energy.is_none()) {
             text += "nothing is measured: a pilot needs a longer render (--time, --iterations) or a larger picture\n";
@@ -82,24 +82,34 @@ fn forecast_error(args: &PlanArgs, loaded: &Loaded, planned: &PlannedPicture, ta
     let view = View::new(&loaded.scene, &planned.camera);
     let settings = with_light_paths(planned.chosen.settings.clone(), args.options.photons, view.camera.whole()[0]);
     let mut finish = args.options.forecast_finish()?;
-    let work = || forecast(view, &settings, &mut finish, target);
+    let spent = planned.chosen.spent().cpu_seconds;
+    let work = || forecast(view, &settings, &mut finish, target, spent);
     Form::for_output(args.json).during("trying how the error falls", work)
 }
 
-/// The forecast as a sentence: `error 2.0 % after about 3 min 20 s (0.11 core-hours, 400 iterations)`, and the pilot
-/// that this follows from.
-fn sentence(error: f64, forecast: Option<Forecast>) -> String {
+/// The forecast as a sentence: `error 2.0 % after about 3 min 20 s (0.11 core-hours, 400 iterations)`, the render that it
+/// assumes, and the pilot that it follows from.
+fn sentence(error: f64, forecast: Option<Forecast>, planned: &PlannedPicture) -> String {
     let Some(Forecast { iterations, seconds, core_seconds, pilot: (done, reached), .. }) = forecast else {
         return format!("error {}: a pilot tells no time after which it is reached\n", percent(error));
     };
+    let cost = match core_seconds {
+        short if short < MIN_CORE_HOURS * 3600.0 => format!("{short:.1} core-seconds"),
+        long => format!("{:.2} core-hours", long / 3600.0),
+    };
+    let ((width, height), chosen) = (planned.camera.size(), &planned.chosen);
+    let method = chosen.candidate.map_or_else(|| chosen.settings.method.name().into(), |candidate| candidate.name());
     format!(
-        "error {} after about {} ({:.2} core-hours, {iterations} iterations): a small pilot had {} after {done}\n",
+        "error {} after about {} ({cost}, {iterations} iterations) of a finished render of {width} x {height} pixels by \
+         {method}, without --iterations and --time: a small pilot had {} after {done}\n",
         percent(error),
         duration(seconds),
-        core_seconds / 3600.0,
         percent(reached),
     )
 }
+
+/// Core-hours below which a cost is given in core-seconds.
+const MIN_CORE_HOURS: f64 = 0.1;
 
 /// A column of the plan's table: its title, and its text for an effect.
 type Column = (&'static str, fn(&EffectPlan) -> String);
