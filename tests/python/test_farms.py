@@ -44,6 +44,12 @@ class Tasks(support.Scratch):
         out = self.dir / "a.exr"
         for index in (2, 0, 1):
             script("shard.sh", support.scene("blocks"), out, f"{index}/3", "--iterations", 6, *OPTIONS)
+            if index == 0:
+                self.assertIn("2 of 3 shards are merged", script("merge.sh", out, "--partial").stderr)
+                self.assertEqual(len(list((self.dir / "a.shards").glob("shard-?.exr"))), 2)
+        for words in (["--help"], ["-o", self.dir / "other.exr"]):
+            self.assertIn("is not written", script("merge.sh", out, *words).stderr)
+            self.assertEqual(len(list((self.dir / "a.shards").glob("shard-?.exr"))), 3)
         script("merge.sh", out, "--png", self.dir / "a.png")
         self.assertEqual(channels(out), self.whole("--iterations", 6))
         self.assertTrue((self.dir / "a.png").exists())
