@@ -5,6 +5,8 @@
 
 pub mod error;
 
+pub mod files;
+
 pub mod git_lfs;
 
 pub mod processor;

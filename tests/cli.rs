@@ -21,6 +21,8 @@ mod first_picture;
 mod frames;
 #[path = "cli/generated.rs"]
 mod generated;
+#[path = "cli/inputs.rs"]
+mod inputs;
 #[path = "cli/libraries.rs"]
 mod libraries;
 #[path = "cli/limits.rs"]

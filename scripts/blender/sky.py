@@ -72,9 +72,17 @@ def _measure_irradiance(scene, toward, angle):
     return (pixels * (width / _SUN_PIXELS) ** 2 / squared[..., None] ** 2).sum((0, 1))
 
 
+def unused_name(path, name):
+    """`name`, changed unless no image of the .blend is stored in a file of that name beside `path`."""
+    used = {os.path.realpath(bpy.path.abspath(image.filepath)) for image in bpy.data.images if image.filepath}
+    while os.path.realpath(os.path.join(os.path.dirname(path), name)) in used:
+        name = f"_{name}"
+    return name
+
+
 def bake_world(scene, path, width=1024):
     """Render the world with a panoramic Cycles camera to an .exr beside the .glb. Returns the key `environment`."""
-    name = os.path.splitext(os.path.basename(path))[0] + ".environment.exr"
+    name = unused_name(path, os.path.splitext(os.path.basename(path))[0] + ".environment.exr")
     file = os.path.join(os.path.dirname(path), name)
 
     def bake():

@@ -122,11 +122,11 @@ def _beside(image, path):
         with open(bpy.path.abspath(image.filepath), "rb") as file:
             data = file.read()
     if kind and data:
-        name = f"{stem}.environment{kind}"
+        name = sky.unused_name(path, f"{stem}.environment{kind}")
         with open(os.path.join(os.path.dirname(path), name), "wb") as file:
             file.write(data)
         return name
-    name = f"{stem}.environment.exr"
+    name = sky.unused_name(path, f"{stem}.environment.exr")
     flat = bpy.data.images.new(name, *image.size, float_buffer=True)
     try:
         pixels = list(image.pixels)

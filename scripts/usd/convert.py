@@ -1,6 +1,6 @@
 """Convert a USD stage (.usd, .usda, .usdc, .usdz) to a .glb that caustique renders.
 
-    python3 scripts/usd/convert.py STAGE -o OUT.glb [--frame N] [--allow-outside]
+    python3 scripts/usd/convert.py STAGE -o OUT.glb [--frame N] [--allow-outside]     print the files that were read
     python3 scripts/usd/convert.py STAGE --arguments     print the options of `render` from its RenderSettings
 
 The script needs the packages in scripts/requirements-usd.txt, such as `usd-core`, which composes the stage. `caustique
@@ -31,16 +31,21 @@ def _checked_text():
                     "write the stage again, in UTF-8")
 
 
-@_checked_text()
 def write(path, out, frame=None, allow_outside=False):
     """Convert the stage at `path` at time code `frame` to the .glb `out`. Returns the losses, a list of texts."""
+    return _written(path, out, frame, allow_outside).losses.lines
+
+
+@_checked_text()
+def _written(path, out, frame, allow_outside):
+    """Convert as `write`. Returns the stage."""
     from scene import Scene
     from stage import Stage
     stage = Stage(path, frame, allow_outside)
     scene = Scene(stage, os.path.dirname(os.path.abspath(out)))
     scene.fill()
     scene.document.write(out)
-    return stage.losses.lines
+    return stage
 
 
 @_checked_text()
@@ -68,18 +73,30 @@ def main(given):
         return _convert(given)
     folder = os.path.dirname(os.path.abspath(__file__))
     try:
-        return run_guarded(lambda: _convert(given), folder, *given.guard)
+        return run_guarded(lambda: _convert_confined(given), folder, *given.guard)
     except Fault as fault:
         return _print_error(fault.where, fault.fault, fault.hint)
 
 
+def _convert_confined(given):
+    """Convert as `_convert`, in a process of its own. USD looks for layers beside the stage alone."""
+    if not given.allow_outside:
+        given.stage, given.output = (path and os.path.abspath(path) for path in (given.stage, given.output))
+        # USD would also look in the current folder and in those of this variable.
+        os.environ.pop("PXR_AR_DEFAULT_SEARCH_PATH", None)
+        with contextlib.suppress(OSError):
+            os.chdir(os.path.dirname(given.stage))
+    return _convert(given)
+
+
 def _convert(given):
-    """Convert, or print the arguments. Returns the exit code."""
+    """Convert and print the files that were read, or print the arguments. Returns the exit code."""
     try:
         if given.arguments:
             print(json.dumps(arguments(given.stage, given.allow_outside)))
         else:
-            write(given.stage, given.output, given.frame, given.allow_outside)
+            stage = _written(given.stage, given.output, given.frame, given.allow_outside)
+            print(json.dumps(sorted(stage.files)))
         return 0
     except Fault as fault:
         where, what, hint = fault.where, fault.fault, fault.hint

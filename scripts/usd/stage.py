@@ -6,6 +6,7 @@ import re
 
 from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdSkel
 
+from dependencies import check_regular, open_layers, outer_file
 from faults import Fault, Invalid, Losses, check_pointer, text_of
 
 # Limits of metersPerUnit within which squared lengths neither underflow nor overflow.
@@ -29,14 +30,19 @@ class Stage:
         self.path = os.path.abspath(path)
         self.losses = Losses()
         self._folder = None if allow_outside else os.path.realpath(os.path.dirname(self.path))
+        layers = open_layers(self.path, self.check_path)
         _check_pointer_file(self.path, "")
         try:
-            self.stage = Usd.Stage.Open(self.path)
+            self.stage = Usd.Stage.Open(layers[0] if layers else self.path)
         except Tf.ErrorException as error:
             raise Fault("", f"USD cannot read it: {_first_line(error)}", "export it again; usdchecker may say more")
+        # The files that were read, as absolute paths.
+        self.files = {self.path}
         for layer in self.stage.GetUsedLayers():
             if layer.realPath:
-                self.check_path(layer.realPath, "the stage")
+                file = outer_file(layer.realPath)
+                self.check_path(file, "the stage")
+                self.files.add(file)
         for error in self.stage.GetCompositionErrors():
             layer = re.search("@([^@]+)@", text_of(error))
             if layer and self._allows(layer[1]):
@@ -108,11 +114,14 @@ class Stage:
         """Whether the stage may name the file at `path`."""
         return self._folder is None or os.path.commonpath([self._folder, os.path.realpath(path)]) == self._folder
 
-    def check_path(self, path, what):
-        """Raise a Fault if a file is outside the stage's folder and this is not allowed."""
+    def check_path(self, path, what, name=None):
+        """Raise a Fault if a file is outside the stage's folder and this is not allowed.
+
+        `name`: how the stage calls it. The message is the same whether the file exists or not.
+        """
         if self._allows(path):
             return
-        raise Fault(what, f"the file {path} is outside the scene's folder",
+        raise Fault(what, f"the file {name or path} is outside the scene's folder",
                     "put it beside the scene file and name it so, or allow such files with --allow-outside")
 
     def asset(self, prim, value):
@@ -125,9 +134,12 @@ class Stage:
             raise Invalid(where, f"no file has a name as {value.path!r}", "give the texture's path in inputs:file")
         if not value.resolvedPath:
             # Do not reveal whether a file outside the folder exists.
-            self.check_path(os.path.join(os.path.dirname(self.path), value.path), where)
+            self.check_path(os.path.join(os.path.dirname(self.path), value.path), where, value.path)
             raise Invalid(where, f"the file {value.path} is not found", "put it where the stage looks for it")
-        self.check_path(Ar.SplitPackageRelativePathOuter(name)[0], where)
+        file = outer_file(name)
+        self.check_path(file, where, value.path)
+        check_regular(file, where)
+        self.files.add(os.path.abspath(file))
         opened = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(name))
         if opened is None:
             raise Invalid(where, f"the file {value.path} cannot be read", "check your right to read it")

@@ -6,6 +6,7 @@
 //! differ.
 
 use caustique::error::{Error, Result};
+use caustique::files;
 use caustique::image::atomic;
 use rustix::io::Errno;
 use rustix::process::{Pid, test_kill_process};
@@ -40,17 +41,21 @@ pub struct Claim {
     toucher: Option<JoinHandle<()>>,
 }
 
+/// Path of the claim of the frame that is written to `output`.
+pub fn file(output: &Path) -> PathBuf {
+    let mut path = output.as_os_str().to_owned();
+    path.push(".claim");
+    PathBuf::from(path)
+}
+
 impl Claim {
     /// Claims for this process the frame that is written to `output`.
     ///
     /// # Errors
     /// The folder is not writable.
     pub fn claim(output: &Path) -> Result<Claimed> {
-        let mut path = output.as_os_str().to_owned();
-        path.push(".claim");
-        let path = PathBuf::from(path);
         atomic::check_writable(output)?;
-        Claim::make(path, owner()).map_err(|cause| Error::io(output, &cause))
+        Claim::make(file(output), owner()).map_err(|cause| Error::io(output, &cause))
     }
 
     fn make(path: PathBuf, owner: String) -> io::Result<Claimed> {
@@ -70,6 +75,9 @@ impl Claim {
             }
             // The claim was released meanwhile: try again.
             let Some((holder, touched)) = read(&path)? else { continue };
+            if !is_claim(&holder) {
+                return Err(io::Error::other(format!("{} is no claim of a frame", path.display())));
+            }
             if !is_dead(&holder, age(&path, touched)?) {
                 let shown = holder.split('\n').next().unwrap_or_default();
                 return Ok(Claimed::Elsewhere(if shown.is_empty() { "another machine".into() } else { shown.into() }));
@@ -121,7 +129,7 @@ fn touch(file: &File) -> io::Result<()> {
 /// The text of a claim's file and its modification time; `None` if there is no claim.
 fn read(path: &Path) -> io::Result<Option<(String, SystemTime)>> {
     let read = || {
-        let file = File::open(path)?;
+        let file = files::open(path)?;
         let touched = file.metadata()?.modified()?;
         let mut bytes = Vec::new();
         file.take(MAX_BYTES).read_to_end(&mut bytes)?;
@@ -148,10 +156,33 @@ fn is_dead(holder: &str, age: Duration) -> bool {
     age > MAX_AGE || lines.next().filter(|_| of_here).is_some_and(is_gone)
 }
 
-/// Whether no process has this number. A process that may not be signalled exists, although `/proc` may hide it.
+/// Whether no process has this number, or one that has ended. A process that may not be signalled exists, although `/proc`
+/// may hide it.
 fn is_gone(process: &str) -> bool {
     let process = process.parse().ok().filter(|process| *process > 0).and_then(Pid::from_raw);
-    process.is_some_and(|process| test_kill_process(process) == Err(Errno::SRCH))
+    process.is_some_and(|process| test_kill_process(process) == Err(Errno::SRCH) || is_zombie(process))
+}
+
+/// Whether a process has ended, and its parent has not asked for its exit code yet.
+fn is_zombie(process: Pid) -> bool {
+    let stat = fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+    // The state follows the name, which is in brackets and may contain some.
+    stat.rsplit_once(')').is_some_and(|(_, state)| state.trim_start().starts_with(['Z', 'X']))
+}
+
+/// Whether a file holds the text of [`owner`], or nothing yet.
+fn is_claim(text: &str) -> bool {
+    let mut lines = text.lines();
+    text.is_empty() || lines.next().is_some_and(|line| line.contains(", process ")) && lines.count() >= 2
+}
+
+/// Removes the claim of a finished frame if its owner has died before it could.
+pub fn remove_dead(output: &Path) {
+    let path = file(output);
+    let Some((holder, touched)) = read(&path).ok().flatten() else { return };
+    if is_claim(&holder) && age(&path, touched).is_ok_and(|age| is_dead(&holder, age)) {
+        let _ = remove(&path, touched);
+    }
 }
 
 /// Removes the claim's file of a dead process. Several processes may try this at once: under a lock, each checks that
@@ -246,6 +277,32 @@ mod tests {
     fn processes_of_others_are_alive() {
         let own = std::process::id().to_string();
         assert_eq!(["1", &own, "0", "-1", "x", "4194999"].map(is_gone), [false, false, false, false, false, true]);
+    }
+
+    /// A process that was killed, and whose parent has not noticed, is dead.
+    #[test]
+    fn zombies_are_dead() {
+        let mut child = std::process::Command::new("sleep").arg("60").spawn().expect("it starts");
+        let id = child.id().to_string();
+        assert!(!is_gone(&id));
+        child.kill().expect("it can be killed");
+        while !is_gone(&id) {
+            std::thread::yield_now();
+        }
+        child.wait().expect("it has ended");
+    }
+
+    /// A file that is no claim stays, however old it is.
+    #[test]
+    fn files_of_users_are_no_claims() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.exr.claim");
+        fs::write(&path, "the client's claim\n").expect("it can be written");
+        let old = File::options().write(true).open(&path).and_then(|file| file.set_modified(SystemTime::UNIX_EPOCH));
+        old.expect("it can be touched");
+        assert!(Claim::make(path.clone(), owner()).is_err());
+        remove_dead(&folder.path().join("a.exr"));
+        assert!(path.exists());
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::progress::Form;
 use super::{output, print, print_json};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::{Layer, LayerSet};
-use caustique::image::{Comparison, Floor, atomic, compare_with_floor, exr, heat, png};
+use caustique::image::{Comparison, Floor, Outputs, atomic, compare_with_floor, exr, heat, png};
 use caustique::report::errors;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -49,6 +49,8 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     if let Some(page) = &args.page {
         output::check(page, "html")?;
     }
+    let outputs = Outputs::new(args.png.iter().chain(&args.page).cloned())?;
+    outputs.check([args.image.as_path(), &args.reference])?;
     let image = read(&args.image, args.layer.as_deref())?;
     let reference = read(&args.reference, args.layer.as_deref())?;
     let floor = if args.relative { Floor::Relative } else { Floor::Papers };

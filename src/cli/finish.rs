@@ -6,7 +6,7 @@ use super::output::{self, PictureArgs};
 use super::progress::{Form, duration};
 use super::say;
 use caustique::error::{Error, Result};
-use caustique::image::exr;
+use caustique::image::{Outputs, exr};
 use caustique::options::number::threads;
 use caustique::options::{FinishOptions, Frames, path_of_frame};
 use caustique::pipeline::{RenderedFile, write_finish};
@@ -57,6 +57,8 @@ pub fn run(args: &FinishArgs) -> Result<()> {
     }
     output::check(&args.output, "exr")?;
     args.picture.check()?;
+    let outputs = Outputs::new(std::iter::once(&args.output).chain(&args.picture.png).cloned())?;
+    outputs.check(std::iter::once(args.input.as_path()).chain(output::model_file(&args.finish)))?;
     super::pool(args.threads)?.install(|| {
         let (opened, file) = rayon::join(|| open(&args.finish, None), || RenderedFile::read(&args.input));
         let (mut opened, RenderedFile { mut set, mut attributes, naming, remarks }) = (opened?, file?);

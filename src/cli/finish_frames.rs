@@ -1,13 +1,13 @@
 //! The temporal finish of an animation: `caustique finish` with a pattern, and the end of `caustique render --temporal`.
 
-use super::claim::{Claim, Claimed};
+use super::claim::{self, Claim, Claimed};
 use super::finish_options::{look_of, open};
-use super::output::PictureArgs;
+use super::output::{self, PictureArgs};
 use super::progress::{Form, duration};
 use super::say;
 use super::signals::Interrupt;
 use caustique::error::{Error, ErrorKind, Result};
-use caustique::image::exr;
+use caustique::image::{Outputs, exr};
 use caustique::options::{FinishOptions, Frames, files_of_frames, no_frames, path_of_frame};
 use caustique::pipeline::OpenFinish;
 use caustique::pipeline::temporal::FrameFiles;
@@ -41,6 +41,7 @@ impl FrameFinish<'_> {
     pub fn run(&self) -> Result<()> {
         let paths = files_of_frames(self.input).map_err(|cause| Error::io(self.input, &cause))?;
         let numbers = self.numbers(&paths)?;
+        self.check_outputs(&paths, &numbers)?;
         let mut files = FrameFiles::new(paths.clone());
         let mut opened = None;
         for (before, &frame) in numbers.iter().enumerate() {
@@ -73,6 +74,21 @@ impl FrameFinish<'_> {
             ));
         }
         Ok(())
+    }
+
+    /// Checks that no frame replaces the file of a frame that is read, unless it is the frame itself at the end of a render.
+    fn check_outputs(&self, paths: &BTreeMap<u32, PathBuf>, numbers: &[u32]) -> Result<()> {
+        if self.of_render {
+            return Ok(());
+        }
+        let of_frame = |frame: &u32| {
+            let output = path_of_frame(self.output, *frame).unwrap_or_else(|| self.output.to_owned());
+            let claim = self.skip_existing.then(|| claim::file(&output));
+            let png = self.picture.png.as_ref().and_then(|png| path_of_frame(png, *frame));
+            [Some(output), claim, png].into_iter().flatten()
+        };
+        let outputs = Outputs::new(numbers.iter().flat_map(of_frame))?;
+        outputs.check(paths.values().map(PathBuf::as_path).chain(output::model_file(self.finish)))
     }
 
     /// Claims a frame if other processes may finish it too. The inner error is the reason for which it is skipped.
@@ -141,11 +157,11 @@ impl FrameFinish<'_> {
     }
 
     /// Whether a frame needs no finish any more.
-    fn is_done(&self, files: &FrameFiles, frame: u32, output: &Path) -> bool {
+    fn is_done(&self, files: &FrameFiles, frame: u32, path: &Path) -> bool {
         if self.of_render {
             return files.is_finished(frame);
         }
-        std::fs::metadata(output).is_ok_and(|data| data.is_file() && data.len() > 0)
+        output::is_whole(path)
     }
 
     fn report(&self, text: &str) {

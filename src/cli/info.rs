@@ -5,12 +5,12 @@ use super::render::place;
 use super::warnings::lines;
 use super::{plot, print, print_json, printable, scene};
 use caustique::error::{Error, ErrorKind, Result};
+use caustique::files;
 use caustique::film::{LayerSet, describe};
 use caustique::image::exr;
 use caustique::options::SceneOptions;
 use caustique::pipeline::{FINISHED_PICTURE, Place, scene_info};
 use serde_json::{Map, Value, json};
-use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -69,7 +69,7 @@ fn escape(value: &mut Value) {
 
 fn is_exr(path: &Path) -> Result<bool> {
     let mut start = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(4).read_to_end(&mut start));
+    let read = files::open(path).and_then(|file| file.take(4).read_to_end(&mut start));
     read.map_err(|cause| Error::io(path, &cause))?;
     if start.is_empty() {
         return Err(Error::new(ErrorKind::Io, path.display(), "the file is empty"));

@@ -8,6 +8,7 @@ use super::say;
 use caustique::error::Result;
 use caustique::film::{LayerSet, Naming, Selection, take_plain_names};
 use caustique::finish::DenoiserChoice;
+use caustique::image::Outputs;
 use caustique::image::exr::{self, Attributes};
 use caustique::pipeline::merge::{MergeEvent, MergeRequest, Shards, is_shard};
 use caustique::pipeline::seeds::Seeds;
@@ -15,7 +16,7 @@ use caustique::pipeline::{FinishRequest, finish, write_finish};
 use caustique::scene::description::PictureDefaults;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Merge the shards of a render, or renders of different seeds
 ///
@@ -62,9 +63,8 @@ pub struct MergeArgs {
 pub fn run(args: &MergeArgs) -> Result<()> {
     output::check(&args.output, "exr")?;
     args.picture.check()?;
-    for output in std::iter::once(&args.output).chain(&args.picture.png) {
-        output::check_inputs(output, args.inputs.iter().map(PathBuf::as_path))?;
-    }
+    let outputs = Outputs::new(std::iter::once(&args.output).chain(&args.picture.png).cloned())?;
+    outputs.check(args.inputs.iter().map(PathBuf::as_path).chain(args.model.as_deref().map(Path::new)))?;
     let shards = args.inputs.iter().map(|path| is_shard(path)).collect::<Result<Vec<bool>>>()?;
     super::pool(args.threads)?.install(|| if shards.contains(&true) { merge_shards(args) } else { average_seeds(args) })
 }

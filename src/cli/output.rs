@@ -5,6 +5,7 @@ use caustique::film::{LayerSet, Naming};
 use caustique::image::exr::{self, ColourSpace, Compression};
 use caustique::image::tonemap::{Contrast, Look, ToneMap};
 use caustique::image::{atomic, png};
+use caustique::options::FinishOptions;
 use caustique::options::number::Ranged;
 use caustique::scene::description::PictureDefaults;
 use serde::Serialize;
@@ -113,21 +114,14 @@ pub fn check(path: &Path, extension: &str) -> Result<()> {
     atomic::check_writable(path)
 }
 
-/// Checks that an output replaces no input, also if they are named differently.
-///
-/// # Errors
-/// The output is an input.
-pub fn check_inputs<'a>(output: &Path, mut inputs: impl Iterator<Item = &'a Path>) -> Result<()> {
-    if !output.is_file() {
-        return Ok(());
-    }
-    match inputs.find(|input| atomic::is_same_file(input, output)) {
-        None => Ok(()),
-        Some(input) => {
-            let cause = format!("{} is an input, which is not overwritten", input.display());
-            Err(Error::new(ErrorKind::Usage, output.display(), cause).hint("name another output"))
-        }
-    }
+/// The file of the network that finishes a picture; `None` if there is none, or it is one of the program's.
+pub fn model_file(finish: &FinishOptions) -> Option<&Path> {
+    finish.model.as_deref().map(Path::new).filter(|path| path.is_file())
+}
+
+/// Whether a picture is there and whole, so that it need not be made again.
+pub fn is_whole(path: &Path) -> bool {
+    path.is_file() && exr::check_whole(path).is_ok()
 }
 
 /// Whether a path, `-`, stands for standard output.

@@ -2,10 +2,12 @@
 
 use super::{Cli, Command, usage};
 use caustique::error::{Error, ErrorKind, Result};
-use caustique::options::SceneOptions;
+use caustique::options::{SceneOptions, path_of_frame};
+use caustique::scene::folder::Folder;
 use caustique::scene::usd;
 use clap::FromArgMatches;
 use std::ffi::OsString;
+use std::path::Path;
 
 /// Prefix of the argument that names the output of a USD RenderProduct; nothing follows if the product has no name.
 const OUTPUT_PREFIX: &str = "--output=";
@@ -33,7 +35,9 @@ pub fn add_stage_options(command: Command, mut words: Vec<OsString>, line: &mut 
         known.is_none_or(|known| known.get_arguments().any(|argument| has_name(argument, name)))
     });
     if matches!(&command, Command::Render(args) if !args.has_output()) {
-        said.extend(output(&path, products)?);
+        let product = output(&path, products)?;
+        product.iter().try_for_each(|word| check_output(scene, word.trim_start_matches(OUTPUT_PREFIX).as_ref()))?;
+        said.extend(product);
     }
     if said.is_empty() {
         return Ok(command);
@@ -69,6 +73,24 @@ fn output(scene: &SceneOptions, mut products: Vec<String>) -> Result<Option<Stri
     let cause = format!("RenderSettings has several products, and a render writes one: {}", names.join(", "));
     let hint = "-o OUT.exr renders the first; for each of the others make RenderSettings with that product alone";
     Err(Error::new(ErrorKind::Usage, scene.path.display(), cause).hint(hint))
+}
+
+/// Checks that the output that a USD stage names is in the stage's folder, for every frame.
+///
+/// # Errors
+/// It is outside, and the user does not allow this.
+fn check_output(scene: &SceneOptions, output: &Path) -> Result<()> {
+    let numbers = scene.frames.into_iter().flat_map(|frames| frames.iter());
+    let names = numbers.filter_map(|frame| path_of_frame(output, frame)).chain([output.to_owned()]);
+    for name in names {
+        let path = std::path::absolute(&name).map_err(|cause| Error::io(&name, &cause))?;
+        if Folder::of(&scene.path, scene.allow_outside).file(&path).is_err() {
+            let cause = format!("its RenderProduct names the output {}, which is outside its folder", name.display());
+            let error = Error::new(ErrorKind::Usage, scene.path.display(), cause);
+            return Err(error.hint("name the output with -o, or allow such outputs with --allow-outside"));
+        }
+    }
+    Ok(())
 }
 
 /// The scene's options, with the path of a sequence of files replaced by that of its first frame's file.

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::tensor;
 use crate::error::{Error, ErrorKind, Result};
+use crate::files;
 use crate::git_lfs;
 
 /// The bytes of a neural network's ONNX file, and the name of the file for messages.
@@ -25,7 +26,7 @@ impl Model {
     /// # Errors
     /// [`ErrorKind::Io`]: the file cannot be read. Its contents are checked by [`Combiner::new`](super::Combiner::new).
     pub fn from_file(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|cause| {
+        let bytes = files::read(path).map_err(|cause| {
             Error::io(path, &cause)
                 .hint("--model takes compact, or an ONNX file made by scripts/lab/train/export_network.py")
         })?;

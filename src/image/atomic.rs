@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
 use crate::error::{Error, ErrorKind, Result};
+use crate::files::{self, folder};
 
 /// Writes a file through `fill` to a temporary file beside it, flushes that to disk and renames it, so that no reader
 /// sees a partial file. On failure the temporary file is removed and an older file at `path` stays unchanged.
@@ -18,12 +19,68 @@ use crate::error::{Error, ErrorKind, Result};
 /// Errors of `fill`, and of the file system with the path and a remedy.
 pub fn write(path: &Path, fill: impl FnOnce(&mut BufWriter<&mut File>) -> Result<()>) -> Result<()> {
     let target = resolve(path)?;
-    let mut temporary = temporary_beside(&target).map_err(|cause| failure(path, &cause))?;
+    let temporary = filled(path, &target, fill)?;
+    publish(&target, temporary).map_err(|cause| failure(path, &cause))
+}
+
+/// A file with an unfinished version of another one, beside that one, under a random name. It outlives a program that is
+/// killed; [`remove_leftovers`] removes it then.
+pub struct Draft {
+    /// The lock on the file marks it as one whose writer is alive.
+    _file: File,
+    path: PathBuf,
+}
+
+impl Draft {
+    /// Writes an unfinished version of the file `path` through `fill`.
+    ///
+    /// # Errors
+    /// Errors of `fill` and of the file system.
+    pub fn write(path: &Path, fill: impl FnOnce(&mut BufWriter<&mut File>) -> Result<()>) -> Result<Draft> {
+        let written = filled(path, &resolve(path)?, fill)?;
+        // No reader sees a partial draft.
+        let name = written.path().with_extension(DRAFT.trim_start_matches('.'));
+        let kept = written.as_file().sync_all().and_then(|()| Ok(written.persist_noclobber(&name)?));
+        kept.map(|file| Draft { _file: file, path: name }).map_err(|cause| failure(path, &cause))
+    }
+
+    /// Removes the file.
+    pub fn remove(self) {
+        let _ = fs::remove_file(&self.path);
+    }
+}
+
+/// Writes a temporary file for the file `target` through `fill`. `path`: the name of the file in messages.
+fn filled(
+    path: &Path,
+    target: &Path,
+    fill: impl FnOnce(&mut BufWriter<&mut File>) -> Result<()>,
+) -> Result<NamedTempFile> {
+    // Files of a killed program would otherwise stay for ever.
+    if !is_device(target) {
+        remove_stale(folder(target), &prefix(target), PART);
+    }
+    let mut temporary = temporary_beside(target).map_err(|cause| failure(path, &cause))?;
     let mut buffered = BufWriter::with_capacity(1 << 18, temporary.as_file_mut());
     fill(&mut buffered)?;
     buffered.flush().map_err(|cause| failure(path, &cause))?;
     drop(buffered);
-    publish(&target, temporary).map_err(|cause| failure(path, &cause))
+    Ok(temporary)
+}
+
+/// Removes the temporary files and drafts of the file `path` that a killed process has left.
+pub fn remove_leftovers(path: &Path) {
+    let Ok(target) = resolve(path) else { return };
+    [PART, DRAFT].iter().for_each(|suffix| remove_stale(folder(&target), &prefix(&target), suffix));
+}
+
+/// Whether a file has the name of a temporary file or a draft of the file `path`.
+pub fn is_temporary(file: &Path, path: &Path) -> bool {
+    // Most names are told by their first letters.
+    let is_hidden = file.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(PREFIX.as_bytes()));
+    let Some(target) = resolve(path).ok().filter(|_| is_hidden) else { return false };
+    let named = |suffix: &&str| file.file_name().is_some_and(|name| is_ours(name, &prefix(&target), suffix));
+    [PART, DRAFT].iter().any(named) && files::is_same_folder(folder(file), folder(&target))
 }
 
 /// Writes `bytes` as a file, atomically, see [`write()`].
@@ -82,20 +139,6 @@ pub(crate) fn failure(path: &Path, cause: &io::Error) -> Error {
     }
 }
 
-/// Whether two paths name the same file, by device and inode.
-#[cfg(unix)]
-pub fn is_same_file(one: &Path, other: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt;
-    let file = |path: &Path| fs::metadata(path).ok().map(|data| (data.dev(), data.ino()));
-    one == other || file(one).is_some_and(|one| Some(one) == file(other))
-}
-
-/// Whether two paths are equal.
-#[cfg(not(unix))]
-pub fn is_same_file(one: &Path, other: &Path) -> bool {
-    one == other
-}
-
 /// The file that `path` names. Links are followed, also to a file that does not exist yet, so that a link stays a link.
 fn resolve(path: &Path) -> Result<PathBuf> {
     let error = |cause: &str| Error::new(ErrorKind::Io, path.display(), cause);
@@ -106,27 +149,14 @@ fn resolve(path: &Path) -> Result<PathBuf> {
     if is_device(path) {
         return Ok(path.to_owned());
     }
-    let mut target = path.to_owned();
-    let mut links = 0;
-    while let Ok(next) = fs::read_link(&target) {
-        target = folder(&target).join(next);
-        links += 1;
-        if links > MAX_LINKS {
-            return Err(error("is a link that leads back to itself").hint("name a file"));
-        }
-    }
+    let Some(target) = files::follow(path) else {
+        return Err(error("is a link that leads back to itself").hint("name a file"));
+    };
     let folder = folder(&target);
     if !folder.is_dir() {
         return Err(error("its folder does not exist").hint(format!("mkdir -p {}", folder.display())));
     }
     Ok(fs::canonicalize(&target).unwrap_or(target))
-}
-
-/// Maximum length of a chain of symbolic links, as on Linux.
-const MAX_LINKS: usize = 40;
-
-fn folder(path: &Path) -> &Path {
-    path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 fn is_device(path: &Path) -> bool {
@@ -137,17 +167,15 @@ fn is_device(path: &Path) -> bool {
 fn temporary_beside(target: &Path) -> io::Result<NamedTempFile> {
     let prefix = prefix(target);
     let mut builder = tempfile::Builder::new();
-    builder.prefix(&prefix).suffix(SUFFIX);
+    builder.prefix(&prefix).suffix(PART);
     // Temporary files are private by default; ours becomes the user's file, under the user's umask.
     #[cfg(unix)]
     builder.permissions(<Permissions as std::os::unix::fs::PermissionsExt>::from_mode(0o666));
     if is_device(target) {
         return builder.tempfile();
     }
-    let folder = folder(target);
-    remove_stale(folder, &prefix);
     loop {
-        let file = builder.tempfile_in(folder)?;
+        let file = builder.tempfile_in(folder(target))?;
         // The lock marks a file that is being written. Another process may have removed the file before it was locked.
         let locked = file.as_file().lock().is_ok();
         if !locked || file.path().exists() {
@@ -158,7 +186,7 @@ fn temporary_beside(target: &Path) -> io::Result<NamedTempFile> {
 
 /// Prefix of the names of the temporary files for the file `target`.
 fn prefix(target: &Path) -> OsString {
-    let mut prefix = OsString::from(".caustique-");
+    let mut prefix = OsString::from(PREFIX);
     // File names are limited to 255 bytes.
     if let Some(name) = target.file_name().filter(|name| name.len() <= 200) {
         prefix.push(name);
@@ -167,24 +195,28 @@ fn prefix(target: &Path) -> OsString {
     prefix
 }
 
-/// Suffix of the names of temporary files.
-const SUFFIX: &str = ".part";
+/// Prefix of the names of all temporary files.
+const PREFIX: &str = ".caustique-";
+/// Suffix of the names of files that are being written.
+const PART: &str = ".part";
+/// Suffix of the names of unfinished pictures.
+const DRAFT: &str = ".estimate.exr";
 /// Number of random characters between prefix and suffix, the default of `tempfile`.
 const RANDOM: usize = 6;
 
-/// Removes the temporary files in `folder` whose names begin with `prefix` that a killed process has left: files that
-/// no process has locked. On file systems without locks nothing is removed.
-fn remove_stale(folder: &Path, prefix: &OsStr) {
-    let ours = |name: &OsStr| {
-        let (name, prefix) = (name.as_encoded_bytes(), prefix.as_encoded_bytes());
-        name.len() == prefix.len() + RANDOM + SUFFIX.len()
-            && name.starts_with(prefix)
-            && name.ends_with(SUFFIX.as_bytes())
-    };
+/// Whether a name has this prefix and suffix, with random characters between them.
+fn is_ours(name: &OsStr, prefix: &OsStr, suffix: &str) -> bool {
+    let (name, prefix, suffix) = (name.as_encoded_bytes(), prefix.as_encoded_bytes(), suffix.as_bytes());
+    name.len() == prefix.len() + RANDOM + suffix.len() && name.starts_with(prefix) && name.ends_with(suffix)
+}
+
+/// Removes the temporary files in `folder` with these names that a killed process has left: files that no process has
+/// locked. On file systems without locks nothing is removed.
+fn remove_stale(folder: &Path, prefix: &OsStr, suffix: &str) {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     // Opening a pipe would wait for its writer.
     let is_file = |entry: &fs::DirEntry| entry.file_type().is_ok_and(|kind| kind.is_file());
-    for entry in entries.filter(|entry| ours(&entry.file_name()) && is_file(entry)) {
+    for entry in entries.filter(|entry| is_ours(&entry.file_name(), prefix, suffix) && is_file(entry)) {
         // Holding the lock keeps writers out until the file is removed.
         let free = File::open(entry.path()).ok().filter(|file| file.try_lock().is_ok());
         if free.is_some() {

@@ -6,8 +6,10 @@ mod filmic;
 pub mod flip;
 pub mod heat;
 pub mod metrics;
+pub mod outputs;
 pub mod png;
 pub mod tonemap;
 pub mod usd_layer;
 
 pub use metrics::{Comparison, Errors, Floor, compare, compare_with_floor, errors, relative_squared_error};
+pub use outputs::Outputs;

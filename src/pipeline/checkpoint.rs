@@ -6,13 +6,13 @@
 use super::records::{self, Record};
 use crate::error::{Error, ErrorKind, Result};
 use crate::estimator::PixelAccumulator;
+use crate::files;
 use crate::git_lfs;
 use crate::image::atomic;
 use crate::render::{Candidate, State};
 use crate::scene::gltf;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
-use std::fs::File;
 use std::io::{BufReader, Read, Write};
 use std::path::Path;
 
@@ -74,7 +74,7 @@ pub fn check_replaceable(path: &Path, overwrite: bool, remedy: &str) -> Result<(
     if !path.is_file() {
         return Ok(());
     }
-    let mut file = BufReader::new(File::open(path).map_err(|cause| Error::io(path, &cause))?);
+    let mut file = BufReader::new(files::open(path).map_err(|cause| Error::io(path, &cause))?);
     let mut magic = [0; MAGIC.len()];
     let length = file.by_ref().take(MAGIC.len() as u64).read(&mut magic).map_err(|cause| Error::io(path, &cause))?;
     if length > 0 && !magic.starts_with(KIND) {
@@ -99,7 +99,7 @@ pub fn read(path: &Path) -> Result<(Head, State)> {
     let missing =
         |cause| Error::io(path, &cause).hint("name a file that --checkpoint wrote, or start anew without --resume");
     git_lfs::check_file(path)?;
-    let mut file = BufReader::new(File::open(path).map_err(missing)?);
+    let mut file = BufReader::new(files::open(path).map_err(missing)?);
     let mut magic = [0; MAGIC.len()];
     if file.read_exact(&mut magic).is_err() || magic != *MAGIC {
         return Err(

@@ -124,7 +124,10 @@ fn set_environment(description: &mut Description, request: &SceneRequest) -> Res
     if let Some(choice) = &request.environment {
         let source = match choice {
             Environment::Color(color) => EnvironmentSource::Color(*color),
-            Environment::File(path) => environment_file::read(path, &mut description.warnings)?,
+            Environment::File(path) => {
+                description.files.push(path.clone());
+                environment_file::read(path, &mut description.warnings)?
+            }
             Environment::Image(source) => source.clone(),
         };
         description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });

@@ -11,8 +11,8 @@ use super::resume::Resumption;
 use super::saver::Saver;
 use super::slow_iteration;
 use crate::error::{Error, ErrorKind, Result};
+use crate::files;
 use crate::finish::reads_for_picture;
-use crate::image::atomic::is_same_file;
 use crate::image::exr;
 use crate::render::{Control, Progress, RenderInput, Rendered, Session, State, StopReason, TimeSpent, run_session};
 use serde_json::json;
@@ -66,7 +66,7 @@ impl<'a> Running<'a> {
             finished: false,
         };
         let saver = saving.map(|saving| {
-            let continues = request.resume.as_deref().is_some_and(|resume| is_same_file(resume, &saving.path));
+            let continues = request.resume.as_deref().is_some_and(|resume| files::is_same(resume, &saving.path));
             Saver::new(saving, head.clone(), continues)
         });
         let between = BetweenIterations { finish, target, frame, saver };

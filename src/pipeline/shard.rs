@@ -10,6 +10,7 @@ use super::facts::SceneFacts;
 use super::records::{self, Record};
 use crate::error::{Error, ErrorKind, Result};
 use crate::estimator::PixelAccumulator;
+use crate::files;
 use crate::render::ShardResult;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
@@ -68,7 +69,7 @@ impl ShardFile {
     /// # Errors
     /// The file cannot be read, is damaged, or was written by another version of the program.
     pub fn open(path: &Path) -> Result<Option<ShardFile>> {
-        let mut file = BufReader::new(File::open(path).map_err(|cause| Error::io(path, &cause))?);
+        let mut file = BufReader::new(files::open(path).map_err(|cause| Error::io(path, &cause))?);
         let Some(start) = find_records(&mut file).map_err(|cause| Error::io(path, &cause))? else { return Ok(None) };
         file.seek(start).map_err(|cause| Error::io(path, &cause))?;
         let mut record = || Record::read(&mut file).ok().flatten().and_then(|record| record.unpack().ok());

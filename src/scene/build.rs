@@ -82,6 +82,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     let alpha_solids = alpha_solids(&shapes, &materials).into();
     Ok(Scene {
         source: description.source,
+        files: description.files,
         converted: description.converted,
         origin,
         shapes,
@@ -274,6 +275,7 @@ pub(super) fn rebuild_with_materials(
     let lights = Lights::new(&shapes, &materials, others.collect(), sky).with_groups(scene.lights.groups().clone());
     Ok(Scene {
         source: scene.source.clone(),
+        files: scene.files.clone(),
         converted: scene.converted.clone(),
         origin: scene.origin,
         objects: scene.objects.clone(),

@@ -15,6 +15,8 @@ use std::sync::Arc;
 pub struct Description {
     /// Path of the scene file.
     pub source: PathBuf,
+    /// Paths of all files that the scene names or is read from, the scene file included.
+    pub files: Vec<PathBuf>,
     /// Hash of the .glb that a converter has made of the scene file and of all files that the scene file names; `None`
     /// for a file that is read without a converter.
     pub converted: Option<String>,

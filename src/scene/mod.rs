@@ -8,7 +8,7 @@ mod dense;
 pub mod description;
 mod edit;
 pub mod environment_file;
-mod folder;
+pub mod folder;
 pub mod gltf;
 pub mod grid_file;
 pub mod ies;
@@ -44,6 +44,8 @@ use std::sync::Arc;
 pub struct Scene {
     /// Path of the scene file.
     pub source: PathBuf,
+    /// Paths of all files that the scene names or is read from, the scene file included.
+    pub files: Vec<PathBuf>,
     /// Hash of the .glb into which a converter has turned the scene file, see [`Description::converted`]; `None`
     /// without a converter.
     pub converted: Option<String>,

@@ -84,6 +84,7 @@ impl<'a> MomentBuilder<'a> {
         let catchers = build::catchers(&shapes, &materials, rayon::current_num_threads())?;
         Ok(Scene {
             source: scene.source.clone(),
+            files: scene.files.clone(),
             converted: scene.converted.clone(),
             origin: scene.origin,
             objects: scene.objects.clone(),

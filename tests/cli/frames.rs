@@ -182,13 +182,15 @@ fn file_names_that_do_not_fit_the_frames_are_rejected() {
 #[test]
 fn existing_frames_can_be_skipped() {
     let folder = folder();
-    std::fs::write(folder.path("out.1.exr"), "a picture").expect("it can be written");
+    let one = folder.run(&format!("render moving.gltf --frames 1 --seed 7 -o out.1.exr {SMALL}"));
+    assert_eq!(one.code, Some(0), "{}", one.stderr);
+    let picture = std::fs::read(folder.path("out.1.exr")).expect("it is there");
     std::fs::write(folder.path("out.2.exr"), "").expect("it can be written");
     let run = |options: &str| folder.run(&format!("render moving.gltf --frames 1-2 -o out.#.exr {SMALL} {options}"));
     let outcome = run("--skip-existing");
     assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
     assert!(outcome.stderr.starts_with("frame 1: out.1.exr is there\nframe 2 (2 of 2): "), "{}", outcome.stderr);
-    assert_eq!(std::fs::read(folder.path("out.1.exr")).expect("it is there"), b"a picture");
+    assert!(std::fs::read(folder.path("out.1.exr")).expect("it is there") == picture);
     assert_eq!(mean(&folder, "out.2.exr"), 1.0);
     assert_eq!(run("").code, Some(0));
     assert_eq!(mean(&folder, "out.1.exr"), 1.0);
@@ -251,4 +253,34 @@ fn machines_share_the_frames_of_a_sequence() {
     );
     let claims: Vec<String> = folder.files().into_iter().filter(|name| name.ends_with(".claim")).collect();
     assert_eq!(claims, ["out.3.exr.claim"]);
+}
+
+/// With --skip-existing, frames that are cut off or zeros are rendered again, and what a killed process has left beside a
+/// finished frame is removed.
+#[test]
+fn damaged_frames_are_rendered_again() {
+    let folder = folder();
+    let line = format!("render moving.gltf --frames 1-4 -o out.#.exr {SMALL} --skip-existing --progress plain");
+    assert_eq!(folder.run(&line).code, Some(0));
+    let path = |frame: u32| folder.path(&format!("out.{frame}.exr"));
+    let whole: Vec<Vec<u8>> = (1..=4).map(|frame| std::fs::read(path(frame)).expect("it is there")).collect();
+    let length = whole[0].len();
+    std::fs::write(path(1), &whole[0][..length - length / 4]).expect("it can be written");
+    std::fs::write(path(2), vec![0; length]).expect("it can be written");
+    let mut holed = whole[2].clone();
+    holed[length / 2..].fill(0);
+    std::fs::write(path(3), holed).expect("it can be written");
+    let left = [".caustique-out.4.exr-abcdef.part", ".caustique-out.4.exr-abcdef.estimate.exr"];
+    left.iter().for_each(|name| std::fs::write(folder.path(name), "left").expect("it can be written"));
+    let outcome = folder.run(&line);
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    for frame in 1..=3 {
+        let said = format!("frame {frame} ({frame} of 4): out.{frame}.exr, which is damaged and is rendered again\n");
+        assert!(outcome.stderr.contains(&said), "{}", outcome.stderr);
+    }
+    assert!(outcome.stderr.contains("frame 4: out.4.exr is there\n"), "{}", outcome.stderr);
+    for frame in 1..=4 {
+        assert!(caustique::image::exr::check_whole(&path(frame)).is_ok(), "frame {frame}");
+    }
+    assert!(left.iter().all(|name| !folder.path(name).exists()), "{:?}", folder.files());
 }

@@ -222,32 +222,6 @@ fn renders_of_other_seeds_give_their_mean() {
     );
 }
 
-/// Inputs are not overwritten, also if the output names them by another path or link.
-#[test]
-fn inputs_are_not_overwritten() {
-    let folder = Folder::new();
-    for seed in [1, 2] {
-        let outcome = folder.run(&format!(
-            "render scene.glb --width 8 --height 8 --progress none --iterations 2 --method path --seed {seed} -o {seed}.exr"
-        ));
-        assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
-    }
-    std::os::unix::fs::symlink("2.exr", folder.path("link.exr")).expect("a link");
-    std::fs::hard_link(folder.path("2.exr"), folder.path("again.exr")).expect("a link");
-    let before = std::fs::read(folder.path("2.exr")).expect("it is there");
-    for output in ["2.exr", "./2.exr", "link.exr", "again.exr"] {
-        let outcome = folder.run(&format!("merge 1.exr 2.exr -o {output}"));
-        let error = format!("{output}: 2.exr is an input, which is not overwritten\nhint: name another output\n");
-        assert_eq!((outcome.code, outcome.stderr), (Some(2), error));
-    }
-    assert!(std::fs::read(folder.path("2.exr")).expect("it is there") == before);
-    assert_eq!(folder.run("merge 1.exr 2.exr -o both.exr").code, Some(0));
-    let sky = folder.run("render scene.glb -o 1.exr --env 1.exr");
-    assert_eq!((sky.code, folder.read("1.exr").1["seed"].clone()), (Some(2), 1.into()), "{}", sky.stderr);
-    let preview = folder.run("render scene.glb -o out.exr --env 1.exr --preview ./1.exr");
-    assert_eq!((preview.code, folder.read("1.exr").1["seed"].clone()), (Some(2), 1.into()), "{}", preview.stderr);
-}
-
 /// A shard with valid checksums, but with sums that do not fit its header, is rejected as damaged.
 #[test]
 fn forged_shards_are_rejected() {

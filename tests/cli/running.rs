@@ -349,7 +349,7 @@ fn a_preview_shows_the_picture_and_does_not_change_it() {
     assert!(outcome.stderr.contains("a file that ends in .png or .exr, or 'tev'"), "{}", outcome.stderr);
     let outcome = folder.run("render scene.glb -o b.exr --preview b.exr");
     assert_eq!(outcome.code, Some(2));
-    assert!(outcome.stderr.contains("name the same file"), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("b.exr: is the same file as the output b.exr"), "{}", outcome.stderr);
 }
 
 /// The error of a finished picture is estimated with an interval and the tiles with the largest error, which `info`

@@ -339,6 +339,12 @@ fn malformed_commands_end_nothing() {
     let folder = Folder::new();
     write(&folder, "a.glb", &scene());
     let mut server = Server::start(&folder);
+    // Reading a device would not end, and a pipe would have to be waited for.
+    assert!(std::process::Command::new("mkfifo").arg(folder.path("pipe.glb")).status().expect("mkfifo runs").success());
+    for name in ["/dev/zero", "pipe.glb"] {
+        let answer = server.ask(&json!({"command": "load", "id": 1, "scene": name}));
+        assert_eq!(answer["message"], format!("{name}: it is not a regular file"), "{answer}");
+    }
     server.load("a.glb", &[]);
     let commands: Vec<Vec<u8>> = [
         json!({"command": "load", "scene": "missing.glb", "arguments": ["--method", "path"]}),

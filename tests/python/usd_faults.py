@@ -4,6 +4,9 @@ import contextlib
 import io
 import itertools
 import json
+import os
+import subprocess
+import sys
 import unittest
 
 import numpy
@@ -247,6 +250,55 @@ class Faults(usd_support.Stages):
         self.assertEqual(self.outcome(depth * 'def Xform "P" {\n' + prim("Sphere", "") + depth * "}\n"), "")
         document, _ = usd_support.read_glb(self.dir / "out.glb")
         self.assertEqual(document["nodes"][0]["name"], (depth + 1) * "/P")
+
+    def test_layers_are_checked_before_they_are_opened(self):
+        """A stage does not learn whether a file outside its folder exists, and nothing waits for a pipe."""
+        outside, inside = self.dir / "outside", self.dir / "inside"
+        outside.mkdir()
+        inside.mkdir()
+        (outside / "there.usda").write_text("#usda 1.0\n")
+        os.mkfifo(outside / "pipe.usda")
+        os.mkfifo(inside / "pipe.usda")
+        (inside / "link.usda").symlink_to(outside / "there.usda")
+        clips = 'def "A" (clips = {{ dictionary default = {{\n asset[] assetPaths = [@{}@]\nstring primPath = "/A"\n' \
+            'double2[] active = [(0, 0)]\ndouble2[] times = [(0, 0)]\n}} }}) {{}}'
+        arcs = (
+            "(subLayers = [@{}@])", 'def "A" (references = @{}@</B>) {{}}', 'def "A" (payload = @{}@</B>) {{}}', clips,
+            'def "A" (variantSets = "v"\n) {{\nvariantSet "v" = {{ "x" (references = @{}@) {{\n}}\n}}\n}}',
+        )
+        said = set()
+        for name, arc in itertools.product(("there", "none", "pipe"), arcs):
+            with self.subTest(name, arc=arc):
+                stage = inside / f"{next(self.names)}.usda"
+                stage.write_text("#usda 1.0\n" + arc.format(f"../outside/{name}.usda"))
+                with self.assertRaises(Fault) as raised:
+                    convert.write(str(stage), str(self.dir / "out.glb"))
+                said.add(f"{raised.exception}".replace(name, "NAME"))
+        self.assertEqual(said, {f"the stage: the file {outside}/NAME.usda is outside the scene's folder"})
+        for name, what in (("pipe", "is not a regular file"), ("link", "is outside the scene's folder")):
+            for arc in arcs:
+                with self.subTest(name, arc=arc):
+                    stage = inside / f"{next(self.names)}.usda"
+                    stage.write_text("#usda 1.0\n" + arc.format(f"{name}.usda"))
+                    with self.assertRaisesRegex(Fault, what):
+                        convert.write(str(stage), str(self.dir / "out.glb"))
+        os.mkfifo(inside / "grey.png")
+        stage = inside / "texture.usda"
+        stage.write_text("#usda 1.0\n" + prim("DomeLight", "asset inputs:texture:file = @grey.png@"))
+        with self.assertRaisesRegex(Fault, "grey.png is not a regular file"):
+            convert.write(str(stage), str(self.dir / "out.glb"))
+
+    def test_the_files_of_a_stage_are_listed(self):
+        """In a process of its own, which looks for files beside the stage alone."""
+        (self.dir / "part.usda").write_text('#usda 1.0\n(subLayers = [@`"./${NAME}.usda"`@])\ndef Xform "B" {}\n')
+        (self.dir / "base.usda").write_text('#usda 1.0\ndef Sphere "B" {}\n')
+        stage = self.dir / "whole.usda"
+        stage.write_text('#usda 1.0\n(\nexpressionVariables = {\nstring NAME = "base"\n}\nsubLayers = [@part.usda@]\n)\n')
+        command = [sys.executable, usd_support.SCRIPTS / "convert.py", "whole.usda", "-o", "out.glb", "--guard", "60", "0"]
+        with subprocess.Popen(command, cwd=self.dir, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as program:
+            printed = program.stdout.read()
+        names = [str(self.dir / name) for name in ("base.usda", "part.usda", "whole.usda")]
+        self.assertEqual(json.loads(printed), names)
 
     def test_a_binary_stage_cut_short(self):
         self.outcome(MESH % "")

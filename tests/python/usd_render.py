@@ -250,6 +250,42 @@ def RenderVar "Var" {
                 self.assertIn(said, self.in_the_folder(check=code).stderr)
         self.assertEqual(list(self.dir.glob("**/*.exr")), [])
 
+    def test_no_file_of_a_stage_is_overwritten(self):
+        sky = self.dir / "sky.exr"
+        header = {"compression": usd_support.OpenEXR.ZIP_COMPRESSION, "type": usd_support.OpenEXR.scanlineimage}
+        texels = numpy.ones((2, 4, 3), numpy.float32)
+        usd_support.OpenEXR.File(header, {"RGB": texels}).write(str(sky))
+        dome = UsdLux.DomeLight.Define(self.stage, "/Sky")
+        dome.CreateTextureFileAttr(Sdf.AssetPath("./sky.exr"))
+        layer = self.dir / "layer.usda"
+        layer.write_text("#usda 1.0\n")
+        self.stage.GetRootLayer().subLayerPaths.append("./layer.usda")
+        self.products(("Product", "sky.exr"))
+        before = sky.read_bytes()
+        for options, said in (
+            ((), "sky.exr: "), (("-o", "./sky.exr"), "./sky.exr: "),
+            (("-o", "out.exr", "--usd-layer", "layer.usda"), "layer.usda: "),
+        ):
+            with self.subTest(options):
+                done = self.in_the_folder(*options, check=2)
+                self.assertTrue(done.stderr.startswith(said), done.stderr)
+                self.assertIn(" is an input, which is not overwritten", done.stderr)
+        self.assertEqual((sky.read_bytes(), layer.read_text()), (before, "#usda 1.0\n"))
+
+    def test_a_product_outside_the_folder_of_the_stage(self):
+        inner = self.dir / "inner"
+        inner.mkdir()
+        self.products(("Product", "../victim.exr"))
+        self.path = self.path.rename(inner / "stage.usda")
+        victim = self.dir / "victim.exr"
+        victim.write_text("precious")
+        for folder in (inner, inner / "..", "/"):
+            done = support.run(["render", self.path, *QUICK], check=2, cwd=folder)
+            self.assertIn("RenderProduct names the output ../victim.exr, which is outside its folder", done.stderr)
+        self.assertEqual(victim.read_text(), "precious")
+        support.run(["render", self.path, *QUICK, "--allow-outside"], check=0, cwd=inner)
+        self.assertNotEqual(victim.read_bytes()[:4], b"prec")
+
     def test_without_a_product_the_picture_is_beside_the_stage(self):
         for file in ("", None):
             with self.subTest(file):

@@ -3,7 +3,7 @@
 use crate::error::raised;
 use crate::image::picture;
 use crate::value::to_python;
-use caustique::image::{Floor, atomic, compare_with_floor, heat};
+use caustique::image::{Floor, Outputs, atomic, compare_with_floor, heat};
 use caustique::report::errors;
 use numpy::IntoPyArray;
 use numpy::ndarray::Array2;
@@ -27,6 +27,10 @@ pub fn compare<'py>(
     png: Option<PathBuf>,
     page: Option<PathBuf>,
 ) -> PyResult<Bound<'py, PyAny>> {
+    let inputs = [image, reference].map(|given| given.extract::<PathBuf>().ok());
+    Outputs::new(png.iter().chain(&page).cloned())
+        .and_then(|outputs| outputs.check(inputs.iter().flatten().map(PathBuf::as_path)))
+        .map_err(raised)?;
     let (a, b) = (picture("image", image, layer)?, picture("reference", reference, layer)?);
     let names = [("image", image), ("reference", reference)]
         .map(|(place, given)| given.extract::<PathBuf>().map_or(place.into(), |path| path.display().to_string()));

@@ -9,8 +9,9 @@ use crate::progress::Progress;
 use crate::value::{to_json, to_python};
 use crate::work::{Caller, warn, work};
 use caustique::error::Error as Fault;
+use caustique::files;
 use caustique::film::Naming;
-use caustique::image::atomic;
+use caustique::image::{Outputs, atomic};
 use caustique::options::SceneOptions;
 use caustique::pipeline::load::{Environment, load, load_bytes};
 use caustique::pipeline::plan::plan_picture;
@@ -129,8 +130,9 @@ impl Scene {
         keywords.check_all_taken()?;
         let saving = run.saving(None);
         saving.iter().try_for_each(|saving| atomic::check_writable(&saving.path)).map_err(raised)?;
-        let goes_on =
-            |saving: &Saving| run.resume.as_ref().is_some_and(|resume| atomic::is_same_file(resume, &saving.path));
+        let outputs = Outputs::new(saving.iter().map(|saving| saving.path.clone())).map_err(raised)?;
+        outputs.check(self.loaded.scene.files.iter().map(PathBuf::as_path)).map_err(raised)?;
+        let goes_on = |saving: &Saving| run.resume.as_ref().is_some_and(|resume| files::is_same(resume, &saving.path));
         if let Some(Saving { path, .. }) = saving.as_ref().filter(|saving| !goes_on(saving)) {
             let remedy = format!("go on with resume='{}', or start anew with overwrite=True", path.display());
             checkpoint::check_replaceable(path, run.overwrite, &remedy).map_err(raised)?;

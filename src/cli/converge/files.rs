@@ -3,9 +3,10 @@
 use super::options::ConvergeArgs;
 use crate::cli::say;
 use caustique::error::{Error, Result};
+use caustique::files;
 use caustique::film::{Layer, LayerSet};
-use caustique::image::atomic;
 use caustique::image::exr::{self, Attributes};
+use caustique::image::{Outputs, atomic};
 use caustique::report::curve::Axis;
 use caustique::report::entry::{Line, Metric, PictureSource};
 use caustique::report::equal_time::Outcome;
@@ -13,8 +14,9 @@ use caustique::report::page::Plots;
 use caustique::report::point::Point;
 use caustique::report::summary::{Subject, Summary};
 use caustique::report::{data, page, plot};
+use caustique::scene::Scene;
 use serde_json::{Value, json};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Checks that the output folder of a comparison is writable or can be created.
 ///
@@ -37,6 +39,39 @@ pub fn check(folder: &Path) -> Result<()> {
     atomic::check_writable(new)
 }
 
+/// The files that a comparison reads.
+pub fn inputs(args: &ConvergeArgs, scene: &Scene) -> Vec<PathBuf> {
+    scene.files.iter().chain(&args.reference).cloned().collect()
+}
+
+/// Checks that no file with a fixed name in the output folder is an input.
+///
+/// # Errors
+/// One is an input.
+pub fn check_inputs(args: &ConvergeArgs, inputs: &[PathBuf]) -> Result<()> {
+    let plots = AXES.iter().flat_map(|(_, _, name)| ERRORS.map(|error| plot_name(error, name)));
+    let reference = args.reference.is_none().then(|| "reference.exr".to_owned());
+    let names = TABLES.map(str::to_owned).into_iter().chain(reference).chain(plots);
+    let outputs = Outputs::new(names.map(|name| args.output.join(name)))?;
+    outputs.check(inputs.iter().map(PathBuf::as_path))
+}
+
+/// Names of the files with the figures and the page.
+const TABLES: [&str; 3] = ["points.csv", "points.json", "index.html"];
+/// Axes of the plots, with their headings and names.
+const AXES: [(Axis, &str, &str); 3] = [
+    (Axis::Seconds, "Error against seconds", "seconds"),
+    (Axis::CoreSeconds, "Error against core-seconds", "core-seconds"),
+    (Axis::Iterations, "Error against iterations", "iterations"),
+];
+/// Names of the errors of the plots: in the chosen metric, trimmed, and of all pixels.
+const ERRORS: [&str; 3] = ["error", "trimmed", "all"];
+
+/// Name of the file of a plot.
+fn plot_name(error: &str, axis: &str) -> String {
+    format!("{error}-{axis}.svg")
+}
+
 /// Writes all files of a comparison, the figures first, so that a full disk does not lose them.
 ///
 /// # Errors
@@ -46,7 +81,7 @@ pub fn write(
     subject: &Subject,
     outcome: &mut Outcome,
     summary: &Summary,
-    threads: usize,
+    (inputs, threads): (&[PathBuf], usize),
 ) -> Result<()> {
     let folder = &args.output;
     let bytes = |name: &str, bytes: &[u8]| atomic::write_bytes(&folder.join(name), bytes);
@@ -55,24 +90,20 @@ pub fn write(
     let mut plots = Vec::new();
     let beside = &summary.second;
     let trimmed = if beside.metric == Metric::RelMseTrimmed { "trimmed" } else { "all" };
-    for (axis, heading, name) in [
-        (Axis::Seconds, "Error against seconds", "seconds"),
-        (Axis::CoreSeconds, "Error against core-seconds", "core-seconds"),
-        (Axis::Iterations, "Error against iterations", "iterations"),
-    ] {
+    for (axis, heading, name) in AXES {
         let mut row = Plots { heading, plots: Vec::new() };
         for (what, metric, curves) in
             [("error", subject.metric, &summary.curves), (trimmed, beside.metric, &beside.curves)]
         {
             if let Some(svg) = plot::svg(subject, summary, metric, curves, axis)? {
-                bytes(&format!("{what}-{name}.svg"), svg.as_bytes())?;
+                bytes(&plot_name(what, name), svg.as_bytes())?;
                 row.plots.push((metric, svg));
             }
         }
         plots.push(row);
     }
     bytes("index.html", page::html(subject, outcome, summary, &plots)?.as_bytes())?;
-    write_pictures(folder, subject, outcome, threads)?;
+    write_pictures(folder, subject, outcome, (inputs, threads))?;
     if args.progress.for_people() {
         say(&format!(
             "{}: the report; points.csv, points.json, plots and pictures are beside it",
@@ -82,12 +113,20 @@ pub fn write(
     Ok(())
 }
 
-/// Writes the last picture of every curve (the errors of a run over time) with the first seed as EXR.
-fn write_pictures(folder: &Path, subject: &Subject, outcome: &mut Outcome, threads: usize) -> Result<()> {
+/// Writes the last picture of every curve (the errors of a run over time) with the first seed as EXR, under names that no
+/// input has.
+fn write_pictures(
+    folder: &Path,
+    subject: &Subject,
+    outcome: &mut Outcome,
+    (inputs, threads): (&[PathBuf], usize),
+) -> Result<()> {
+    let path = |name: &str| folder.join(format!("{name}.exr"));
+    let is_input = |name: &str| inputs.iter().any(|input| files::is_same(input, &path(name)));
     let mut names: Vec<String> = Vec::new();
     for (line, of) in subject.lines.iter().enumerate() {
         let mut name = slug(&of.name);
-        if name == "reference" || names.contains(&name) {
+        while name == "reference" || names.contains(&name) || is_input(&name) {
             name += &format!("-{}", line + 1);
         }
         let mine = |point: &&Point| point.line == line && point.picture.is_some();
@@ -96,8 +135,7 @@ fn write_pictures(folder: &Path, subject: &Subject, outcome: &mut Outcome, threa
         let header = header(subject, outcome, of, threads);
         let mut set = LayerSet::new(picture.size().width, picture.size().height);
         set.push(Layer::interleaved("", "RGB", picture))?;
-        let path = folder.join(format!("{name}.exr"));
-        exr::write(&path, &set, &Attributes::of(&header)?, exr::Options::default())?;
+        exr::write(&path(&name), &set, &Attributes::of(&header)?, exr::Options::default())?;
         names.push(name);
     }
     Ok(())

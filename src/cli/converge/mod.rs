@@ -50,6 +50,8 @@ pub fn run(args: &ConvergeArgs) -> Result<()> {
 fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Result<()> {
     let threads = rayon::current_num_threads();
     let Loaded { scene, removed, .. } = scene::read(&args.scene, args.progress, threads)?;
+    let inputs = files::inputs(args, &scene);
+    files::check_inputs(args, &inputs)?;
     scene::print_warnings(&args.scene, &scene.warnings)?;
     let camera = scene.camera(&args.camera_request())?;
     let view = View::new(&scene, &camera);
@@ -103,7 +105,7 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     let look = Look { exposure: args.exposure as f32, ..args.tonemap.into() };
     let wishes = ReportOptions { targets: args.targets.clone(), targets_of: more, windows, look, notes };
     let summary = summarize(&subject, &mut outcome, &wishes)?;
-    files::write(args, &subject, &mut outcome, &summary, threads)?;
+    files::write(args, &subject, &mut outcome, &summary, (&inputs, threads))?;
     if let Some(error) = outcome.failures.pop() {
         return Err(error);
     }

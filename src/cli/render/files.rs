@@ -3,15 +3,17 @@
 
 use super::options::RenderArgs;
 use super::preview::Target;
-use crate::cli::{output, print_file};
+use crate::cli::{claim, output, print_file};
 use caustique::error::{Error, ErrorKind, Result};
+use caustique::files;
 use caustique::film::LayerSet;
+use caustique::image::atomic::{self, Draft};
 use caustique::image::exr::{self, Attributes};
-use caustique::image::{atomic, usd_layer};
-use caustique::options::EnvironmentChoice;
+use caustique::image::{Outputs, usd_layer};
+use caustique::options::Frames;
 use caustique::pipeline::checkpoint;
 use caustique::pipeline::shard::ShardSums;
-use caustique::scene::gltf;
+use caustique::scene::Scene;
 use caustique::temporary;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -46,44 +48,80 @@ const MAX_ESTIMATE_SHARE: f64 = 0.05;
 /// Bytes per second that a slow disk writes.
 const MIN_BYTES_PER_SECOND: f64 = 2e8;
 
-/// Writes the unfinished EXR beside the output, in case the program is killed during the finish, and returns its path.
-/// The output itself is only ever a finished picture. Writes nothing if that takes a large share of the `seconds` of
-/// the render. Ignores errors, which occur again when the finished picture is written.
-pub fn write_estimate(args: &RenderArgs, set: &LayerSet, attributes: &Attributes, seconds: f64) -> Option<PathBuf> {
+/// Writes the unfinished EXR to a draft beside the output, in case the program is killed during the finish. The output
+/// itself is only ever a finished picture. Writes nothing if that takes a large share of the `seconds` of the render.
+/// Ignores errors, which occur again when the finished picture is written.
+pub fn write_estimate(args: &RenderArgs, set: &LayerSet, attributes: &Attributes, seconds: f64) -> Option<Draft> {
     let is_file = std::fs::metadata(&args.output).map_or(true, |data| data.is_file());
     let bytes: usize = set.layers.iter().flat_map(|layer| &layer.planes).map(|p| size_of_val(&p.values[..])).sum();
     let is_quick = bytes as f64 <= MAX_ESTIMATE_SHARE * MIN_BYTES_PER_SECOND * seconds;
     if output::is_stdout(&args.output) || !is_file || !is_quick {
         return None;
     }
-    let path = args.output.with_extension("estimate.exr");
     let compression = exr::Compression::None;
     let options = exr::Options { compression, naming: args.run.exr_naming, ..exr::Options::default() };
-    exr::write_followed(&path, set, attributes, options, |_| Ok(())).ok().map(|()| path)
+    exr::write_draft(&args.output, set, attributes, options).ok()
 }
 
-/// Checks that no output replaces the scene, its environment, or a file that the scene names.
+/// The files that a render writes.
+///
+/// # Errors
+/// Two of them are the same file.
+pub fn outputs(args: &RenderArgs) -> Result<Outputs> {
+    let preview = preview_file(args).into_iter().map(Path::to_owned);
+    Outputs::new(frame_outputs(args).into_iter().chain(preview))
+}
+
+/// The files that a render of these frames writes.
+///
+/// # Errors
+/// Two of them are the same file.
+pub fn outputs_of_frames(args: &RenderArgs, frames: Frames) -> Result<Outputs> {
+    let preview = preview_file(args).into_iter().map(Path::to_owned);
+    Outputs::new(frames.iter().flat_map(|frame| frame_outputs(&args.at(frame))).chain(preview))
+}
+
+/// The file of the preview, unless it becomes the PNG.
+fn preview_file(args: &RenderArgs) -> Option<&Path> {
+    let becomes_png = |file: &&Path| args.picture.png.as_ref().is_some_and(|png| files::is_same(png, file));
+    args.preview.as_ref().and_then(Target::file).filter(|file| !becomes_png(file))
+}
+
+/// The files that the render of one frame writes.
+fn frame_outputs(args: &RenderArgs) -> Vec<PathBuf> {
+    let output = Some(&args.output).filter(|output| !output::is_stdout(output));
+    let claim = output.filter(|_| args.skip_existing).map(|output| claim::file(output));
+    let checkpoint = args.saving().map(|saving| saving.path);
+    let named = [output, args.picture.png.as_ref(), args.usd_layer.as_ref()].map(Option::<&PathBuf>::cloned);
+    named.into_iter().chain([claim, checkpoint]).flatten().collect()
+}
+
+/// Checks that no output replaces a file that the render reads: one of the scene, its network, or the checkpoint that it
+/// continues from, unless the checkpoint is saved there again.
 ///
 /// # Errors
 /// An output is such a file.
-pub fn check_inputs(args: &RenderArgs) -> Result<()> {
-    // Checkpoints replace only checkpoints.
-    let written = args.files().filter(|(option, _)| !["--resume", "--checkpoint"].contains(option));
-    let outputs = written.map(|(_, path)| path.as_path());
-    let mut outputs =
-        outputs.chain(args.preview.as_ref().and_then(Target::file)).filter(|path| path.is_file()).peekable();
-    if outputs.peek().is_none() {
-        return Ok(());
+pub fn check_inputs(args: &RenderArgs, outputs: &Outputs, scene: &Scene) -> Result<()> {
+    let saves = |path: &&PathBuf| args.saving().is_some_and(|saving| files::is_same(&saving.path, path));
+    let resumed = args.run.resume.as_ref().filter(|path| !saves(path));
+    let files = scene.files.iter().chain(resumed).map(PathBuf::as_path);
+    outputs.check(files.chain(output::model_file(&args.options.finish)))?;
+    // The names of the pictures in this folder depend on the techniques.
+    let Some(folder) = &args.debug_techniques else { return Ok(()) };
+    let is_picture = |path: &Path| path.extension().is_some_and(|kind| kind == "exr" || kind == "png");
+    match scene.files.iter().find(|path| is_picture(path) && files::is_same_folder(files::folder(path), folder)) {
+        None => Ok(()),
+        Some(input) => {
+            let cause = format!("{} is an input in this folder, which might be overwritten", input.display());
+            let error = Error::new(ErrorKind::Usage, folder.display(), cause);
+            Err(error.hint("name another folder with --debug-techniques"))
+        }
     }
-    let scene = &args.options.scene;
-    // The render reports a scene that cannot be read. A pipe can be read only once.
-    let bytes = scene.path.is_file().then(|| std::fs::read(&scene.path).ok()).flatten().unwrap_or_default();
-    let mut inputs = gltf::files(&bytes, &scene.path, true);
-    inputs.push(scene.path.clone());
-    if let Some(EnvironmentChoice::File(sky)) = &scene.env {
-        inputs.push(sky.clone());
-    }
-    outputs.try_for_each(|path| output::check_inputs(path, inputs.iter().map(PathBuf::as_path)))
+}
+
+/// Removes the files that a killed process has left beside the finished files of a render.
+pub fn remove_leftovers(args: &RenderArgs) {
+    frame_outputs(args).iter().for_each(|path| atomic::remove_leftovers(path));
 }
 
 /// Checks that the checkpoint can be written and does not replace the checkpoint of another render.
@@ -92,7 +130,7 @@ pub fn check_inputs(args: &RenderArgs) -> Result<()> {
 /// Errors of [`atomic::check_writable`] and [`checkpoint::check_replaceable`].
 pub fn check_checkpoint(args: &RenderArgs) -> Result<()> {
     args.run.checkpoint.as_deref().map_or(Ok(()), atomic::check_writable)?;
-    let goes_on = |path: &Path| args.run.resume.as_ref().is_some_and(|resume| atomic::is_same_file(resume, path));
+    let goes_on = |path: &Path| args.run.resume.as_ref().is_some_and(|resume| files::is_same(resume, path));
     let Some(path) = args.saving().map(|saving| saving.path).filter(|path| !goes_on(path)) else { return Ok(()) };
     let of_frames = args.options.scene.frames.is_some();
     let going_on = if of_frames { "--skip-existing".into() } else { format!("--resume {}", path.display()) };

@@ -16,6 +16,8 @@ use super::warnings::lines;
 use super::{events, output, say, scene};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::LayerSet;
+use caustique::image::Outputs;
+use caustique::image::atomic::Draft;
 use caustique::options::SceneOptions;
 use caustique::pipeline::plan::reason;
 use caustique::pipeline::{self, Delivery, Event, Loaded, Observer, Phase, Request};
@@ -24,9 +26,8 @@ use caustique::render::Settings;
 use caustique::scene::Scene;
 use caustique::scene::description::PictureDefaults;
 use caustique::stop::Stop;
-use preview::Preview;
+use preview::{Preview, Target};
 use serde_json::json;
-use std::path::PathBuf;
 pub use summary::{Summary, place, print_finish, print_picture, warn_unseen};
 
 /// Renders a scene, or frames of its animation, as `caustique render`.
@@ -36,15 +37,15 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         Some(frames) => sequence::run(args, frames),
         None => {
             sequence::refuse_patterns(args)?;
-            render_one(args, None)
+            render_one(args, &files::outputs(args)?, None)
         }
     })
 }
 
 /// Renders one picture, of a scene or of a frame. Everything that can be wrong is found before the first light path.
-fn render_one(args: &RenderArgs, turn: Option<FrameOfRun>) -> Result<()> {
+fn render_one(args: &RenderArgs, outputs: &Outputs, turn: Option<FrameOfRun>) -> Result<()> {
     let request = check(args)?;
-    let mut reports = Reports::new(args, turn);
+    let mut reports = Reports::new(args, outputs, turn);
     let delivery = pipeline::render(request, &mut reports).map_err(|error| reports.explain(error))?;
     reports.deliver(delivery)
 }
@@ -54,8 +55,9 @@ fn render_one(args: &RenderArgs, turn: Option<FrameOfRun>) -> Result<()> {
 /// # Errors
 /// Errors of [`run`].
 pub fn render_loaded(args: &RenderArgs, loaded: &Loaded, control: Control) -> Result<()> {
+    let outputs = files::outputs(args)?;
     let request = check(args)?;
-    let mut reports = Reports { control: Some(control), ..Reports::new(args, None) };
+    let mut reports = Reports { control: Some(control), ..Reports::new(args, &outputs, None) };
     let delivery = pipeline::render_loaded(request, loaded, &mut reports)?;
     reports.deliver(delivery)
 }
@@ -67,8 +69,7 @@ fn check(args: &RenderArgs) -> Result<Request<'_>> {
     output::check_render(&args.output)?;
     args.picture.check()?;
     files::check_usd_layer(args)?;
-    files::check_inputs(args)?;
-    args.preview.as_ref().map_or(Ok(()), |target| target.check(&args.output))?;
+    args.preview.as_ref().map_or(Ok(()), Target::check)?;
     files::check_checkpoint(args)?;
     techniques::prepare(args)?;
     Ok(Request {
@@ -88,6 +89,8 @@ fn check(args: &RenderArgs) -> Result<Request<'_>> {
 /// Reports the progress of a render to people and programs, and writes its files.
 struct Reports<'a> {
     args: &'a RenderArgs,
+    /// The files that the command writes, of all its frames.
+    outputs: &'a Outputs,
     turn: Option<FrameOfRun>,
     interrupt: Option<Interrupt>,
     /// How another program stops the render; `None`: signals do.
@@ -100,8 +103,8 @@ struct Reports<'a> {
     summary: Option<Summary>,
     /// Seconds that the render has taken.
     seconds: f64,
-    /// Path of the unfinished picture, which is kept until the finished picture is written.
-    estimate: Option<PathBuf>,
+    /// The unfinished picture, which is kept until the finished picture is written.
+    estimate: Option<Draft>,
     /// Explanation to print if the picture turns out black.
     reason_if_black: String,
     /// Frame, exposure and tone curve that the scene asks for.
@@ -110,6 +113,7 @@ struct Reports<'a> {
 
 impl Observer for Reports<'_> {
     fn accept(&mut self, scene: &Scene) -> Result<()> {
+        files::check_inputs(self.args, self.outputs, scene)?;
         self.announce_default_names();
         scene::print_warnings(&self.args.options.scene, &scene.warnings)?;
         self.made_for = scene.picture;
@@ -166,9 +170,10 @@ impl Observer for Reports<'_> {
 }
 
 impl<'a> Reports<'a> {
-    fn new(args: &'a RenderArgs, turn: Option<FrameOfRun>) -> Reports<'a> {
+    fn new(args: &'a RenderArgs, outputs: &'a Outputs, turn: Option<FrameOfRun>) -> Reports<'a> {
         Reports {
             args,
+            outputs,
             turn,
             interrupt: None,
             control: None,
@@ -241,18 +246,19 @@ impl<'a> Reports<'a> {
         let Delivery { set, attributes, techniques, sums, .. } = &delivery;
         let Some(summary) = summary else { return Ok(()) };
         let talk = args.progress.for_people();
-        let written = files::write(args, set, attributes, sums.as_ref())
-            .and(files::write_usd_layer(args, set))
-            .and(args.picture.write_png(set, &made_for))
-            .and(techniques::write(args, techniques, &made_for));
+        // The EXR comes last: where it exists, the frame is done.
+        let others = args.picture.write_png(set, &made_for).and(techniques::write(args, techniques, &made_for));
+        let others = files::write_usd_layer(args, set).and(others);
+        let written = files::write(args, set, attributes, sums.as_ref()).and(others);
         if let Some(mut preview) = preview {
             preview.show(beauty(set), attributes.frame);
         }
         print_end(args, &summary, &delivery, &reason_if_black);
         written?;
         // A file that is already gone is no error: the picture is safe.
-        let spent = [delivery.obsolete_checkpoint.as_deref(), estimate.as_deref()];
-        spent.into_iter().flatten().for_each(|file| drop(std::fs::remove_file(file)));
+        delivery.obsolete_checkpoint.iter().for_each(|file| drop(std::fs::remove_file(file)));
+        estimate.into_iter().for_each(Draft::remove);
+        files::remove_leftovers(args);
         if talk {
             Summary::print_files(args, set, techniques.len());
         }

@@ -60,14 +60,10 @@ impl Target {
     /// Checks that previews can be written.
     ///
     /// # Errors
-    /// The folder is missing or not writable; the file is the output itself.
-    pub fn check(&self, output: &std::path::Path) -> Result<()> {
+    /// The folder is missing or not writable.
+    pub fn check(&self) -> Result<()> {
         match self {
             Target::Png(path) => output::check(path, "png"),
-            Target::Exr(path) if path == output => {
-                let error = Error::new(ErrorKind::Usage, path.display(), "--preview and -o name the same file");
-                Err(error.hint("give the preview a name of its own"))
-            }
             Target::Exr(path) => output::check(path, "exr"),
             Target::Tev => Ok(()),
         }

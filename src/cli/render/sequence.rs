@@ -1,13 +1,15 @@
 //! `--frames`: renders frames one after the other.
 
+use super::files;
 use super::options::RenderArgs;
-use crate::cli::claim::{Claim, Claimed};
+use crate::cli::claim::{self, Claim, Claimed};
 use crate::cli::finish_frames::FrameFinish;
 use crate::cli::progress::FrameOfRun;
 use crate::cli::signals::Interrupt;
-use crate::cli::{events, say};
+use crate::cli::{events, output, say};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::options::{FrameSeed, Frames, is_pattern, path_of_frame};
+use caustique::pipeline::merge::is_shard;
 use caustique::scene::{gltf, usd};
 use serde_json::json;
 
@@ -18,6 +20,7 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
     check(args, frames)?;
     check_temporal(args)?;
     let frames = if nothing_moves(args, frames) { first_alone(args, frames) } else { frames };
+    let outputs = files::outputs_of_frames(args, frames)?;
     let count = frames.iter().len();
     for (before, frame) in frames.iter().enumerate() {
         let mut one = args.at(frame);
@@ -36,6 +39,8 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
         let done = || args.skip_existing && left().is_none() && is_there(&one);
         if done() {
             pass_over("is there".into());
+            files::remove_leftovers(&one);
+            claim::remove_dead(&one.output);
             continue;
         }
         // Held until the frame is written.
@@ -59,11 +64,13 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
                 .hint("the same command with --skip-existing goes on"));
         }
         if args.progress.for_people() {
-            say(&format!("frame {frame} ({} of {count}): {}", before + 1, one.output.display()));
+            let is_damaged = args.skip_existing && std::fs::metadata(&one.output).is_ok_and(|data| data.len() > 0);
+            let again = if is_damaged && left.is_none() { ", which is damaged and is rendered again" } else { "" };
+            say(&format!("frame {frame} ({} of {count}): {}{again}", before + 1, one.output.display()));
         }
         // If there are several frames, some may have no checkpoint.
         one.run.resume = left.clone().or(one.run.resume.filter(|path| count == 1 || path.exists()));
-        super::render_one(&one, Some(FrameOfRun { frame, before, count })).map_err(|error| {
+        super::render_one(&one, &outputs, Some(FrameOfRun { frame, before, count })).map_err(|error| {
             let of_left = left.filter(|left| error.place == left.display().to_string());
             let error = match of_left {
                 Some(left) => error.hint(format!("give the same options, or remove {}", left.display())),
@@ -103,10 +110,10 @@ fn first_alone(args: &RenderArgs, frames: Frames) -> Frames {
     Frames::one(first)
 }
 
-/// Whether the output of the frame exists. Files are replaced atomically, so an existing file is complete, unless it is
-/// an empty placeholder.
+/// Whether the output of the frame is there and whole: a copy may have been cut off, and an empty file is a placeholder.
 fn is_there(args: &RenderArgs) -> bool {
-    std::fs::metadata(&args.output).is_ok_and(|data| data.is_file() && data.len() > 0)
+    let has_sums = || args.options.shard.is_none() || is_shard(&args.output).is_ok_and(|is_shard| is_shard);
+    output::is_whole(&args.output) && has_sums()
 }
 
 /// Checks that the frames have different file names.

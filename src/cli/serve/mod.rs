@@ -7,6 +7,7 @@ mod outbox;
 use super::render::{self, RenderArgs};
 use super::{parse_render, signals};
 use caustique::error::{Error, ErrorKind, Result};
+use caustique::files;
 use caustique::film::{LayerSet, Plane};
 use caustique::options::number::threads;
 use caustique::options::{FinishOptions, SceneOptions};
@@ -96,6 +97,8 @@ impl Server {
             None => options.clone(),
             Some(frames) => options.at(frames.single().ok_or_else(|| one_frame(options))?),
         };
+        // The program that waits for the answer must not wait for a pipe.
+        files::open(&options.path).map_err(|cause| Error::io(&options.path, &cause).hint("name a scene file"))?;
         let mut request = options.request();
         // A later command may ask for motion vectors.
         request.options.motion_vectors = true;

@@ -33,6 +33,19 @@ pub(super) fn sort_attributes<F: Read + Write + Seek>(file: &mut F, parts: usize
     file.write_all(&sorted)
 }
 
+/// Position behind the headers of an EXR with this number of parts. `several`: whether it is a file of several parts, whose
+/// headers end with another zero.
+///
+/// # Errors
+/// Errors of `file`, and `InvalidData` if the bytes are not a header.
+pub(super) fn end(file: &mut (impl Read + Seek), parts: usize, several: bool) -> io::Result<u64> {
+    file.seek(SeekFrom::Start(PREAMBLE))?;
+    for _ in 0..parts {
+        while read_attribute(file)?.is_some() {}
+    }
+    Ok(file.stream_position()? + u64::from(several))
+}
+
 /// The bytes of one attribute of the header: name, zero, type, zero, size of the value (four bytes, little endian),
 /// value. `None` at the end of the header.
 fn read_attribute(reader: &mut impl Read) -> io::Result<Option<Vec<u8>>> {

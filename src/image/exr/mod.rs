@@ -7,6 +7,7 @@
 mod colour_space;
 mod header;
 mod read;
+mod whole;
 mod write;
 mod zip;
 
@@ -14,7 +15,8 @@ use std::collections::BTreeMap;
 
 pub use colour_space::ColourSpace;
 pub use read::{read, read_header, read_layers};
-pub use write::{Compression, Options, write, write_followed};
+pub use whole::check_whole;
+pub use write::{Compression, Options, write, write_draft, write_followed};
 
 /// Name and version of the program, for the headers of EXR files.
 const SOFTWARE: &str = concat!("caustique ", env!("CARGO_PKG_VERSION"));

@@ -16,6 +16,7 @@ use rayon::prelude::*;
 use super::colour_space::convert_to_rec_709;
 use super::{Attributes, zip};
 use crate::error::{Error, ErrorKind, Result};
+use crate::files;
 use crate::film::{Layer, LayerSet, Plane, Sample};
 use crate::git_lfs;
 use crate::memory;
@@ -61,8 +62,8 @@ pub fn read_header(path: &Path) -> Result<(LayerSet, Attributes)> {
 }
 
 /// Reads an open EXR of some length with `decode`.
-fn open<T>(path: &Path, decode: impl FnOnce(BufReader<File>, u64) -> Outcome<T>) -> Result<T> {
-    let file = File::open(path).map_err(|cause| Error::io(path, &cause))?;
+pub(super) fn open<T>(path: &Path, decode: impl FnOnce(BufReader<File>, u64) -> Outcome<T>) -> Result<T> {
+    let file = files::open(path).map_err(|cause| Error::io(path, &cause))?;
     let length = file.metadata().map_err(|cause| Error::io(path, &cause))?.len();
     if length == 0 {
         return Err(Error::new(ErrorKind::Image, path.display(), "the file is empty"));
@@ -86,9 +87,9 @@ fn open<T>(path: &Path, decode: impl FnOnce(BufReader<File>, u64) -> Outcome<T>)
     })
 }
 
-type Outcome<T> = exr::error::Result<T>;
+pub(super) type Outcome<T> = exr::error::Result<T>;
 
-fn invalid(cause: &'static str) -> exr::error::Error {
+pub(super) fn invalid(cause: &'static str) -> exr::error::Error {
     exr::error::Error::Invalid(cause.into())
 }
 
@@ -188,7 +189,7 @@ fn max_ratio(header: &Header) -> u128 {
 
 /// Checks the sizes of the sections of a DWA chunk, eleven 64-bit numbers at its start, because the decoder allocates
 /// memory as they say.
-fn check_sections(chunk: &Chunk, headers: &[Header]) -> Outcome<()> {
+pub(super) fn check_sections(chunk: &Chunk, headers: &[Header]) -> Outcome<()> {
     let Some(header) = headers.get(chunk.layer_index) else { return Err(invalid("part index")) };
     let bytes = match &chunk.compressed_block {
         CompressedBlock::ScanLine(block) => &block.compressed_pixels_le,

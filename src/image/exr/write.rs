@@ -20,7 +20,7 @@ use super::colour_space::ColourSpace;
 use super::{Attributes, Frame, SOFTWARE, header, zip};
 use crate::error::{Error, ErrorKind, Result};
 use crate::film::{LayerSet, Naming, Plane, Sample, check_names};
-use crate::image::atomic;
+use crate::image::atomic::{self, Draft};
 use serde::Serialize;
 
 /// Compression of an EXR. Every method is lossless.
@@ -75,6 +75,30 @@ pub fn write_followed(
     options: Options,
     tail: impl FnOnce(&mut BufWriter<&mut File>) -> std::io::Result<()>,
 ) -> Result<()> {
+    write_by(path, set, attributes, options, |fill| {
+        atomic::write(path, |file| {
+            fill(file)?;
+            file.seek(SeekFrom::End(0)).and_then(|_| tail(file)).map_err(|error| atomic::failure(path, &error))
+        })
+    })
+}
+
+/// Writes an unfinished version of the EXR `path`, beside it.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_draft(path: &Path, set: &LayerSet, attributes: &Attributes, options: Options) -> Result<Draft> {
+    write_by(path, set, attributes, options, |fill| Draft::write(path, fill))
+}
+
+/// Prepares the parts of an EXR. `write` writes its file by calling the function that it gets.
+fn write_by<T>(
+    path: &Path,
+    set: &LayerSet,
+    attributes: &Attributes,
+    options: Options,
+    write: impl FnOnce(&dyn Fn(&mut BufWriter<&mut File>) -> Result<()>) -> Result<T>,
+) -> Result<T> {
     check_names(set, options.naming).map_err(|error| error.within(path.display()))?;
     let converted = options.colour_space.converted(set);
     let set = converted.as_ref().unwrap_or(set);
@@ -91,10 +115,9 @@ pub fn write_followed(
     };
     let headers: Result<exr::meta::Headers> = parts.iter().enumerate().map(header_of).collect();
     let headers = headers.map_err(|error| error.within(path.display()))?;
-    atomic::write(path, |file| {
-        write_chunks(file, set.width, &parts, headers).map_err(|error| failure(path, error))?;
-        let ended = sort(file, parts.len()).and_then(|()| file.seek(SeekFrom::End(0))).and_then(|_| tail(file));
-        ended.map_err(|error| atomic::failure(path, &error))
+    write(&|file| {
+        write_chunks(file, set.width, &parts, headers.clone()).map_err(|error| failure(path, error))?;
+        sort(file, parts.len()).map_err(|error| atomic::failure(path, &error))
     })
 }
 

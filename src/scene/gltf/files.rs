@@ -39,7 +39,7 @@ pub fn files(bytes: &[u8], scene: &Path, allow_outside: bool) -> Vec<PathBuf> {
 }
 
 /// Adds the paths of the files that the JSON names to `found`: `uri` of buffers and images, `file` of an environment.
-fn collect(json: &Value, folder: Folder, found: &mut Vec<PathBuf>) {
+pub(super) fn collect(json: &Value, folder: Folder, found: &mut Vec<PathBuf>) {
     match json {
         Value::Array(values) => values.iter().for_each(|value| collect(value, folder, found)),
         Value::Object(object) => {

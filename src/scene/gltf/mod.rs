@@ -189,8 +189,10 @@ impl MovingFile {
     /// # Errors
     /// As for [`read`].
     pub fn open(path: &Path, options: &ReadOptions) -> Result<(Description, Option<MovingFile>)> {
-        let bytes = std::fs::read(path)
-            .map_err(|e| Error::io(path, &e).hint("check the path of the scene file and your right to read it"))?;
+        // A scene may also come through a pipe, which can be read once.
+        let bytes =
+            crate::files::receive(path, crate::memory::available().map_or(u64::MAX, |available| available.bytes / 2))
+                .map_err(|e| Error::io(path, &e).hint("check the path of the scene file and your right to read it"))?;
         MovingFile::from_bytes(bytes.into(), path, options)
     }
 

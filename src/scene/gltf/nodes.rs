@@ -5,6 +5,7 @@ use super::clipping::{self, Clip};
 use super::deform::Deformation;
 use super::document::{Document, extension, get, named};
 use super::extras::{self, ObjectExtras, Rate, SceneExtras};
+use super::files;
 use super::flat::flatten;
 use super::materials::{Library, tangent_coordinates};
 use super::shells;
@@ -88,6 +89,8 @@ fn describe_pose(
         let plural = if n == 1 { "material has an occlusion texture" } else { "materials have occlusion textures" };
         out.warnings.push(format!("{n} {plural}, ignored: occlusion is simulated"));
     }
+    out.files = vec![path.to_owned()];
+    files::collect(&document.raw, document.folder, &mut out.files);
     out.materials.clone_from(&library.list);
     out.textures.clone_from(&library.textures.list);
     let factor = lights::reconsider_units(&mut out);

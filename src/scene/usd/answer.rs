@@ -2,7 +2,8 @@
 
 use crate::error::{Error, ErrorKind, Result};
 use serde::Deserialize;
-use std::path::Path;
+use serde::de::DeserializeOwned;
+use std::path::{Path, PathBuf};
 
 /// Longest text of another program in a message, in characters.
 const MAX_LENGTH: usize = 500;
@@ -20,8 +21,20 @@ struct Fault {
 /// # Errors
 /// The converter printed something else.
 pub fn options(printed: &[u8], stage: &Path) -> Result<Vec<String>> {
+    parse(printed, stage, "options")
+}
+
+/// The files that the USD converter printed: those that it has read, the stage included.
+///
+/// # Errors
+/// The converter printed something else.
+pub fn files(printed: &[u8], stage: &Path) -> Result<Vec<PathBuf>> {
+    parse(printed, stage, "files")
+}
+
+fn parse<T: DeserializeOwned>(printed: &[u8], stage: &Path, what: &str) -> Result<T> {
     serde_json::from_slice(printed).map_err(|cause| {
-        Error::new(ErrorKind::Scene, stage.display(), format!("the converter printed no options: {cause}"))
+        Error::new(ErrorKind::Scene, stage.display(), format!("the converter printed no {what}: {cause}"))
     })
 }
 

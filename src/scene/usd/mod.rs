@@ -10,6 +10,7 @@ pub use python::Interpreter;
 use super::description::Description;
 use super::gltf::{self, FrameTime, Pose, ReadOptions};
 use crate::error::{Error, ErrorKind, Result};
+use crate::files;
 use crate::memory;
 use crate::stop::Stop;
 use crate::temporary;
@@ -24,9 +25,10 @@ use std::time::Duration;
 const EXTENSIONS: [&str; 4] = ["usd", "usda", "usdc", "usdz"];
 
 /// Names and contents of the files of the USD converter (in Python), embedded in the program.
-const SOURCES: [(&str, &str); 20] = [
+const SOURCES: [(&str, &str); 21] = [
     ("cameras.py", include_str!("../../../scripts/usd/cameras.py")),
     ("convert.py", include_str!("../../../scripts/usd/convert.py")),
+    ("dependencies.py", include_str!("../../../scripts/usd/dependencies.py")),
     ("document.py", include_str!("../../../scripts/usd/document.py")),
     ("dome.py", include_str!("../../../scripts/usd/dome.py")),
     ("faults.py", include_str!("../../../scripts/usd/faults.py")),
@@ -67,7 +69,7 @@ pub fn read(path: &Path, options: &ReadOptions, after_frame: f64, stop: &Stop) -
         let time = f64::from(frame.number) + gltf::instant(options.shutter) + after_frame;
         arguments.extend(["--frame".into(), time.to_string().into()]);
     }
-    converter.run(&arguments, options.allow_outside, stop)?;
+    let printed = converter.run(&arguments, options.allow_outside, stop)?.stdout;
     // The converter has applied the frame, and has copied the files that the stage names beside the .glb.
     let frame = options.frame.map(|frame| FrameTime { of_sequence: true, ..frame });
     let read = gltf::read(&glb, &ReadOptions { frame, allow_outside: false, ..options.clone() });
@@ -76,6 +78,7 @@ pub fn read(path: &Path, options: &ReadOptions, after_frame: f64, stop: &Stop) -
         error
     })?;
     description.source = path.to_owned();
+    description.files = answer::files(&printed, path)?;
     // A stage may move wherever it has a frame.
     description.animated = options.frame.is_some();
     // The converted file contains the layers, textures and other files of the stage.
@@ -145,7 +148,7 @@ struct Converter<'p> {
 
 impl<'p> Converter<'p> {
     fn new(stage: &'p Path) -> Result<Converter<'p>> {
-        std::fs::File::open(stage)
+        files::open(stage)
             .map_err(|e| Error::io(stage, &e).hint("check the path of the scene file and your right to read it"))?;
         let interpreter = Interpreter::find()?;
         let folder = temporary::create_folder("caustique-usd-")?;
