@@ -3,8 +3,8 @@
 use super::progress::Form;
 use super::{output, print, print_json};
 use caustique::error::{Error, ErrorKind, Result};
-use caustique::film::{Layer, LayerSet};
-use caustique::image::{Comparison, Floor, Outputs, atomic, compare_with_floor, exr, heat, png};
+use caustique::film::Layer;
+use caustique::image::{Comparison, Floor, Outputs, Windowed, atomic, compare_windows, heat, png};
 use caustique::report::errors;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -54,23 +54,26 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     let image = read(&args.image, args.layer.as_deref())?;
     let reference = read(&args.reference, args.layer.as_deref())?;
     let floor = if args.relative { Floor::Relative } else { Floor::Papers };
-    let compared = Form::for_output(args.json).during("comparing", || compare_with_floor(&image, &reference, floor));
-    let comparison = compared.map_err(|e| e.within(args.image.display()))?;
+    let compared = Form::for_output(args.json).during("comparing", || compare_windows(&image, &reference, floor));
+    let (mut comparison, [image, reference]) = compared.map_err(|e| e.within(args.image.display()))?;
     if let Some(path) = &args.png {
-        let colours = comparison.flip_map.iter().map(|&error| heat::magma(error));
-        png::write(path, image.size(), colours)?;
+        let map = image.expand_values(&comparison.flip_map)?;
+        png::write(path, image.whole, map.iter().map(|&error| heat::magma(error)))?;
     }
     if let Some(path) = &args.page {
         let names = [&args.image, &args.reference].map(|path| path.display().to_string());
-        let page = errors::html(&image, &reference, names.each_ref().map(String::as_str), &comparison)?;
+        comparison.flip_map = image.expand_values(&comparison.flip_map)?;
+        let page =
+            errors::html(&image.expand()?, &reference.expand()?, names.each_ref().map(String::as_str), &comparison)?;
         atomic::write_bytes(path, page.as_bytes())?;
     }
     if args.json { print_json(&json!(comparison)) } else { print(&text(&comparison)) }
 }
 
 /// Reads the layers of an EXR. If a layer is named, it becomes the picture, without the other layers.
-fn read(path: &Path, layer: Option<&str>) -> Result<LayerSet> {
-    let (mut set, _) = exr::read(path)?;
+fn read(path: &Path, layer: Option<&str>) -> Result<Windowed> {
+    let mut windowed = Windowed::read(path)?;
+    let set = &mut windowed.set;
     if let Some(name) = layer {
         let names: Vec<String> = set.layers.iter().map(describe_layer).collect();
         set.layers.retain(|layer| layer.name == name);
@@ -80,7 +83,7 @@ fn read(path: &Path, layer: Option<&str>) -> Result<LayerSet> {
         };
         layer.name.clear();
     }
-    Ok(set)
+    Ok(windowed)
 }
 
 /// The name of a layer for messages, or the channels of the beauty layer, which has no name.

@@ -89,7 +89,12 @@ impl Picture {
     /// The constant that is added to the squared value of this picture as the reference of relative errors
     /// ([`floor::relative_to_mean`]).
     pub fn relative_floor(&self) -> f64 {
-        floor::relative_to_mean(self.iter().map(|rgb| channel_mean(*rgb)))
+        self.relative_floor_with(0)
+    }
+
+    /// The [`Self::relative_floor`] of this picture and this number of black pixels around it.
+    pub fn relative_floor_with(&self, black: usize) -> f64 {
+        floor::relative_to_mean(self.iter().map(|rgb| channel_mean(*rgb)).chain(std::iter::repeat_n(0.0, black)))
     }
 }
 

@@ -14,6 +14,9 @@ use crate::math::{Rgb, luminance};
 /// Pixels per degree of the visual field, for the standard observer.
 const PIXELS_PER_DEGREE: f32 = 3840.0 * std::f32::consts::PI / 180.0;
 
+/// Distance in pixels over which a pixel influences others; the widest filter has a radius of 10.
+pub(super) const REACH: usize = 16;
+
 /// Compressive exponent of colour differences, FLIP 2020 section 4.1.3.
 const COLOUR_EXPONENT: f32 = 0.7;
 /// The share of the largest colour difference that maps to `KNEE_TO`, FLIP 2020 section 4.1.3.
@@ -33,7 +36,13 @@ const FEATURE_EXPONENT: f32 = 0.5;
 /// leaves open: a median of zero is replaced by the median of the luminances above zero; a black reference gets one
 /// exposure.
 pub fn hdr(reference: &Picture, test: &Picture) -> Vec<f32> {
-    let (first, last) = exposures(reference);
+    hdr_within(reference, test, 0)
+}
+
+/// [`hdr`] of a window of two pictures, around which `outside` pixels are black in both, [`REACH`] of them at least on each
+/// side that is not the border of the pictures.
+pub(super) fn hdr_within(reference: &Picture, test: &Picture, outside: usize) -> Vec<f32> {
+    let (first, last) = exposures(reference, outside);
     let count = (last - first).ceil().max(2.0) as usize;
     let step = (last - first) / (count - 1) as f32;
     let detector = Detector::new();
@@ -65,7 +74,7 @@ pub fn ldr(reference: &Picture, test: &Picture) -> Vec<f32> {
 }
 
 /// First and last exposure in stops at which the pictures are compared, HDR-FLIP 2021 section 3.1.
-fn exposures(reference: &Picture) -> (f32, f32) {
+fn exposures(reference: &Picture, outside: usize) -> (f32, f32) {
     let mut luminances: Vec<f32> =
         reference.iter().map(|rgb| luminance(Rgb::from_array(*rgb).max(Vec3::ZERO))).collect();
     luminances.sort_unstable_by(f32::total_cmp);
@@ -73,7 +82,9 @@ fn exposures(reference: &Picture) -> (f32, f32) {
     if brightest <= 0.0 {
         return (0.0, 0.0);
     }
-    let mut median = luminances[luminances.len() / 2];
+    // The black pixels around the picture are the darkest.
+    let middle = (luminances.len() + outside) / 2;
+    let mut median = middle.checked_sub(outside).map_or(0.0, |middle| luminances[middle]);
     if median <= 0.0 {
         let positive = &luminances[luminances.partition_point(|&y| y <= 0.0)..];
         median = positive[positive.len() / 2];

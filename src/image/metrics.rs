@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::flip;
+use super::window::{Windowed, check_sizes};
 use crate::error::{Error, ErrorKind, Result};
 use crate::film::{LayerSet, Picture, Size, channel_mean};
 use crate::memory;
@@ -46,10 +47,10 @@ pub enum Floor {
 }
 
 impl Floor {
-    fn of(self, reference: &Picture) -> f64 {
+    fn of(self, reference: &Picture, outside: usize) -> f64 {
         match self {
             Floor::Papers => floor::ABSOLUTE,
-            Floor::Relative => reference.relative_floor(),
+            Floor::Relative => reference.relative_floor_with(outside),
         }
     }
 }
@@ -70,21 +71,25 @@ pub struct Errors {
 /// The errors of `a` against the reference `b` over all pixels that are finite in both; `None` if there is no such
 /// pixel.
 pub fn errors(a: &Picture, b: &Picture) -> Option<Errors> {
-    errors_with_floor(a, b, floor::ABSOLUTE)
+    errors_with_floor(a, b, floor::ABSOLUTE, 0)
 }
 
-fn errors_with_floor(a: &Picture, b: &Picture, floor: f64) -> Option<Errors> {
+/// `outside`: number of pixels around both pictures that are black in both.
+fn errors_with_floor(a: &Picture, b: &Picture, floor: f64, outside: usize) -> Option<Errors> {
     let finite = |&i: &usize| a[i].iter().chain(&b[i]).all(|v| v.is_finite());
     let pixels: Vec<usize> = (0..a.len().min(b.len())).filter(finite).collect();
-    if pixels.is_empty() {
+    let count = pixels.len() + outside;
+    if count == 0 {
         return None;
     }
-    let n = pixels.len() as f64;
+    let n = count as f64;
     let mut relative: Vec<f64> = pixels.iter().map(|&i| squared_error(a[i], b[i]) / weight(b[i], floor)).collect();
     let relmse = relative.iter().sum::<f64>() / n;
     relative.sort_unstable_by(f64::total_cmp);
-    relative.truncate(pixels.len() - (n * TRIMMED_SHARE) as usize);
-    let relmse_trimmed = relative.iter().sum::<f64>() / relative.len() as f64;
+    let kept = count - (n * TRIMMED_SHARE) as usize;
+    // The error of the black pixels is zero, the smallest.
+    relative.truncate(kept.saturating_sub(outside));
+    let relmse_trimmed = relative.iter().sum::<f64>() / kept as f64;
     let mse = pixels.iter().map(|&i| squared_error(a[i], b[i])).sum::<f64>() / n;
     let total = |image: &Picture| pixels.iter().flat_map(|&i| image[i]).map(f64::from).sum::<f64>();
     let (sum_a, sum_b) = (total(a), total(b));
@@ -115,10 +120,11 @@ pub fn squared_error(x: [f32; 3], r: [f32; 3]) -> f64 {
 /// offset nothing. Pixels that are not finite in both pictures are left out, also of windows. `None` if no other pixel
 /// exists, or if the sizes differ.
 pub fn grain(a: &Picture, b: &Picture) -> Option<f64> {
-    grain_with_floor(a, b, floor::ABSOLUTE)
+    grain_with_floor(a, b, floor::ABSOLUTE, 0)
 }
 
-fn grain_with_floor(a: &Picture, b: &Picture, floor: f64) -> Option<f64> {
+/// `outside`: number of pixels around both pictures that are black in both.
+fn grain_with_floor(a: &Picture, b: &Picture, floor: f64, outside: usize) -> Option<f64> {
     if a.size() != b.size() {
         return None;
     }
@@ -128,7 +134,7 @@ fn grain_with_floor(a: &Picture, b: &Picture, floor: f64) -> Option<f64> {
         finite(i).then(|| std::array::from_fn(|c| f64::from(a[i][c]) - f64::from(b[i][c])))
     };
     let errors: Vec<Option<[f64; 3]>> = (0..a.len()).map(error).collect();
-    let (mut sum, mut pixels) = (0.0, 0_usize);
+    let (mut sum, mut pixels) = (0.0, outside);
     for y in 0..height {
         for x in 0..width {
             let i = y * width + x;
@@ -164,45 +170,57 @@ pub fn compare(a: &LayerSet, b: &LayerSet) -> Result<Comparison> {
 /// As [`compare`].
 pub fn compare_with_floor(a: &LayerSet, b: &LayerSet, floor: Floor) -> Result<Comparison> {
     check_sizes(a.size(), b.size())?;
-    let bytes = (a.width as u64).saturating_mul(a.height as u64).saturating_mul(COMPARED_PIXEL_BYTES);
-    if bytes >= memory::MIN_CHECKED_BYTES {
-        let needed = memory::require(bytes, format_args!("comparing {} x {} pixels", a.width, a.height));
-        needed.map_err(|e| e.hint("compare smaller pictures, or with more memory"))?;
+    check_memory(a.size())?;
+    compare_pictures(&a.beauty()?, &b.beauty()?, floor, 0)
+}
+
+/// Compares two pictures as [`compare_with_floor`] does, within the windows of their files: what lies outside both costs
+/// neither time nor memory. Returns the comparison, and the pictures in their common window, which its map of FLIP has.
+///
+/// # Errors
+/// As [`compare`].
+pub fn compare_windows(a: &Windowed, b: &Windowed, floor: Floor) -> Result<(Comparison, [Windowed; 2])> {
+    check_sizes(a.whole, b.whole)?;
+    let joined = Windowed::join(a, b, flip::REACH)?;
+    let [one, other] = &joined;
+    check_memory(one.set.size())?;
+    let comparison = compare_pictures(&one.set.beauty()?, &other.set.beauty()?, floor, one.outside())?;
+    Ok((comparison, joined))
+}
+
+fn check_memory(Size { width, height }: Size) -> Result<()> {
+    let bytes = (width as u64).saturating_mul(height as u64).saturating_mul(COMPARED_PIXEL_BYTES);
+    if bytes < memory::MIN_CHECKED_BYTES {
+        return Ok(());
     }
-    compare_pictures(&a.beauty()?, &b.beauty()?, floor)
+    let needed = memory::require(bytes, format_args!("comparing {width} x {height} pixels"));
+    needed.map_err(|e| e.hint("compare smaller pictures, or with more memory"))
 }
 
 /// Bytes of memory per pixel while two pictures are compared, besides the layers of the files: two pictures, two
 /// exposed copies of them, and the buffers of FLIP.
 const COMPARED_PIXEL_BYTES: u64 = 200;
 
-fn check_sizes(a: Size, b: Size) -> Result<()> {
-    if a == b {
-        return Ok(());
-    }
-    let cause = format!("pictures of {} x {} and {} x {} pixels", a.width, a.height, b.width, b.height);
-    Err(Error::new(ErrorKind::Image, "", cause).hint("render both with the same --width and --height"))
-}
-
-/// Compares the scene-linear picture `a` with the reference `b`, see [`compare`].
+/// Compares the scene-linear picture `a` with the reference `b`, see [`compare`]. `outside`: number of pixels around both
+/// that are black in both.
 ///
 /// # Errors
 /// The sizes differ, or no pixel is finite in both.
-pub fn compare_pictures(a: &Picture, b: &Picture, floor: Floor) -> Result<Comparison> {
+pub fn compare_pictures(a: &Picture, b: &Picture, floor: Floor, outside: usize) -> Result<Comparison> {
     check_sizes(a.size(), b.size())?;
     let finite = |i: usize| a[i].iter().chain(&b[i]).all(|v| v.is_finite());
     let pixels: Vec<usize> = (0..a.len()).filter(|&i| finite(i)).collect();
-    let floor = floor.of(b);
+    let floor = floor.of(b, outside);
     let (Some(Errors { relmse, relmse_trimmed, mse, mean_ratio }), Some(grain)) =
-        (errors_with_floor(a, b, floor), grain_with_floor(a, b, floor))
+        (errors_with_floor(a, b, floor, outside), grain_with_floor(a, b, floor, outside))
     else {
         return Err(Error::new(ErrorKind::Image, "", "the pictures have no pixel with finite values in common"));
     };
 
     // FLIP filters over neighbours, so that missing pixels need a value: black in both pictures is no difference.
     let filled = |image: &Picture| Picture::from_fn(image.size(), |i| if finite(i) { image[i] } else { [0.0; 3] });
-    let mut flip_map = flip::hdr(&filled(b), &filled(a));
-    let flip = pixels.iter().map(|&i| f64::from(flip_map[i])).sum::<f64>() / pixels.len() as f64;
+    let mut flip_map = flip::hdr_within(&filled(b), &filled(a), outside);
+    let flip = pixels.iter().map(|&i| f64::from(flip_map[i])).sum::<f64>() / (pixels.len() + outside) as f64;
     (0..a.len()).filter(|&i| !finite(i)).for_each(|i| flip_map[i] = 1.0);
     Ok(Comparison {
         relmse,

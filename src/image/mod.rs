@@ -10,6 +10,10 @@ pub mod outputs;
 pub mod png;
 pub mod tonemap;
 pub mod usd_layer;
+pub mod window;
 
-pub use metrics::{Comparison, Errors, Floor, compare, compare_with_floor, errors, relative_squared_error};
+pub use metrics::{
+    Comparison, Errors, Floor, compare, compare_windows, compare_with_floor, errors, relative_squared_error,
+};
 pub use outputs::Outputs;
+pub use window::Windowed;

@@ -2,8 +2,9 @@
 //! published values.
 
 use caustique::film::{Layer, LayerSet, Picture, Size};
+use caustique::image::exr::{self, Attributes, Frame};
 use caustique::image::tonemap::{Contrast, Look, ToneMap, srgb_decode};
-use caustique::image::{Floor, compare, flip, heat, metrics};
+use caustique::image::{Floor, Windowed, compare, compare_windows, compare_with_floor, flip, heat, metrics};
 use caustique::math::Rgb;
 
 const WIDTH: usize = 96;
@@ -183,7 +184,7 @@ fn incomparable_pictures_are_an_error() {
     let error = compare(&empty, &picture(4, 2, |_| [0.0; 3])).unwrap_err();
     assert!(error.cause.contains("no picture among the layers (depth)"), "{error}");
     let black = |width, height| Picture::filled(Size { width, height }, [0.0; 3]);
-    assert!(metrics::compare_pictures(&black(2, 2), &black(3, 1), Floor::Papers).is_err());
+    assert!(metrics::compare_pictures(&black(2, 2), &black(3, 1), Floor::Papers, 0).is_err());
 }
 
 #[test]
@@ -331,4 +332,48 @@ fn neutral_is_the_published_curve() {
             assert!((shown - expected).abs() < 1e-4, "{colour:?}: {shown} instead of {expected}");
         }
     }
+}
+
+/// Pictures of which files hold small windows have the same errors as whole ones, and take little memory.
+#[test]
+fn windows_have_the_errors_of_whole_pictures() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (reference, test) = fixture(1.0);
+    let write = |name: &str, picture: &Picture, whole: [u32; 2], corner: [u32; 2]| {
+        let mut set = LayerSet::new(WIDTH, HEIGHT);
+        set.push(Layer::interleaved("", "RGB", picture.iter().copied())).expect("it fits");
+        let frame = Frame { display: whole, corner, world_to_camera: [0.0; 16], world_to_ndc: [0.0; 16] };
+        let path = folder.path().join(name);
+        let attributes = Attributes { frame: Some(frame), ..Attributes::default() };
+        exr::write(&path, &set, &attributes, exr::Options::default()).expect("it can be written");
+        path
+    };
+    for (whole, [one, other]) in [([300, 200], [[7, 5], [150, 100]]), ([96, 400], [[0, 300], [0, 336]])] {
+        let paths = [write("a.exr", &test, whole, one), write("b.exr", &reference, whole, other)];
+        let [a, b] = paths.each_ref().map(|path| Windowed::read(path).expect("it can be read"));
+        let [c, d] = paths.each_ref().map(|path| exr::read(path).expect("it can be read").0);
+        assert_eq!((a.set.size(), a.expand().expect("there is memory")), (SIZE, c.clone()));
+        for floor in [Floor::Papers, Floor::Relative] {
+            let (found, [joined, _]) = compare_windows(&a, &b, floor).expect("they can be compared");
+            let expected = compare_with_floor(&c, &d, floor).expect("they can be compared");
+            for (found, expected) in [
+                (found.relmse, expected.relmse),
+                (found.relmse_trimmed, expected.relmse_trimmed),
+                (found.mse, expected.mse),
+                (found.flip, expected.flip),
+                (found.grain, expected.grain),
+                (found.floor, expected.floor),
+                (found.mean_ratio.expect("it is not black"), expected.mean_ratio.expect("it is not black")),
+            ] {
+                assert!((found - expected).abs() <= 1e-12 * expected, "{found} {expected}");
+            }
+            let map = joined.expand_values(&found.flip_map).expect("there is memory");
+            assert_eq!(map, expected.flip_map);
+        }
+    }
+    // A display window of a million rows costs nothing.
+    let paths = [write("a.exr", &test, [96, 1 << 20], [0, 5]), write("b.exr", &reference, [96, 1 << 20], [0, 9])];
+    let [a, b] = paths.each_ref().map(|path| Windowed::read(path).expect("it can be read"));
+    let (_, [joined, _]) = compare_windows(&a, &b, Floor::Papers).expect("they can be compared");
+    assert_eq!((a.set.size(), joined.set.size().height), (SIZE, 9 + HEIGHT + 16));
 }

@@ -8,7 +8,8 @@ use std::path::Path;
 
 use exr::block::UncompressedBlock;
 use exr::block::chunk::{Chunk, CompressedBlock};
-use exr::meta::attribute::{AttributeValue, Compression, SampleType, Text};
+use exr::math::Vec2;
+use exr::meta::attribute::{AttributeValue, Compression, IntegerBounds, SampleType, Text};
 use exr::meta::header::Header;
 use exr::prelude::f16;
 use rayon::prelude::*;
@@ -17,8 +18,9 @@ use super::colour_space::convert_to_rec_709;
 use super::{Attributes, zip};
 use crate::error::{Error, ErrorKind, Result};
 use crate::files;
-use crate::film::{Layer, LayerSet, Plane, Sample};
+use crate::film::{Layer, LayerSet, Plane, Sample, Size};
 use crate::git_lfs;
+use crate::image::Windowed;
 use crate::memory;
 
 /// Reads every channel of every part of an EXR as layers, and the string attributes of all parts.
@@ -41,7 +43,46 @@ pub fn read(path: &Path) -> Result<(LayerSet, Attributes)> {
 /// # Errors
 /// As for [`read()`].
 pub fn read_layers(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<(LayerSet, Attributes)> {
-    open(path, |file, length| decode(file, length, &wanted))
+    open(path, |file, length| {
+        decode(file, length, &wanted, Extent::Display).map(|(windowed, attributes)| (windowed.set, attributes))
+    })
+}
+
+/// [`read()`] of the layers within the data windows alone, outside which the picture is black.
+///
+/// # Errors
+/// As for [`read()`].
+pub fn read_window(path: &Path) -> Result<Windowed> {
+    Ok(open(path, |file, length| decode(file, length, &|_| true, Extent::Data))?.0)
+}
+
+/// The part of a picture that is read.
+#[derive(Clone, Copy, PartialEq)]
+enum Extent {
+    /// The display window.
+    Display,
+    /// The part of the display window in which a part of the file has data.
+    Data,
+}
+
+impl Extent {
+    /// The bounds in the coordinates of the file. Without data, one pixel.
+    fn bounds(self, headers: &[Header]) -> Outcome<IntegerBounds> {
+        let display = headers.first().ok_or_else(|| invalid("no part"))?.shared_attributes.display_window;
+        if self == Extent::Display {
+            return Ok(display);
+        }
+        let range = |position: i32, size: usize| [i64::from(position), i64::from(position) + size as i64];
+        let axis = |of: fn(Vec2<i32>) -> i32, size: fn(Vec2<usize>) -> usize| {
+            let [low, high] = range(of(display.position), size(display.size));
+            let data = headers.iter().map(|part| range(of(part.own_attributes.layer_position), size(part.layer_size)));
+            let [first, last] = data.fold([high, low], |[a, b], [start, end]| [a.min(start), b.max(end)]);
+            let first = first.clamp(low, (high - 1).max(low));
+            (first as i32, last.clamp(first, high).abs_diff(first).max(1) as usize)
+        };
+        let ((x, width), (y, height)) = (axis(|at| at.0, |size| size.0), axis(|at| at.1, |size| size.1));
+        Ok(IntegerBounds { position: Vec2(x, y), size: Vec2(width, height) })
+    }
 }
 
 /// The layers of an EXR without values, and the string attributes. Reads no pixels, so that a file whose pixels are
@@ -93,16 +134,22 @@ pub(super) fn invalid(cause: &'static str) -> exr::error::Error {
     exr::error::Error::Invalid(cause.into())
 }
 
-fn decode(file: BufReader<File>, length: u64, wanted: &dyn Fn(&str) -> bool) -> Outcome<(LayerSet, Attributes)> {
+fn decode(
+    file: BufReader<File>,
+    length: u64,
+    wanted: &dyn Fn(&str) -> bool,
+    extent: Extent,
+) -> Outcome<(Windowed, Attributes)> {
     let reader = exr::block::read(file, false)?;
     let reads = wanted_channels(reader.headers(), wanted);
-    check_size(reader.headers(), length, &reads)?;
+    let bounds = extent.bounds(reader.headers())?;
+    check_size(reader.headers(), length, (bounds.size, &reads))?;
     let chunks = reader.filter_chunks(false, |_, _, block| {
         block.level == exr::math::Vec2(0, 0) && reads[block.layer].contains(&true)
     })?;
     let meta = exr::block::reader::ChunksReader::meta_data(&chunks).clone();
     let display = meta.headers[0].shared_attributes.display_window;
-    let mut canvas = Canvas::new(display, &reads)?;
+    let mut canvas = Canvas::new(bounds, &reads)?;
     let decompress = |chunk| {
         check_sections(&chunk, &meta.headers)?;
         UncompressedBlock::decompress_chunk(zip::unpacked(chunk, &meta.headers), &meta, false)
@@ -123,7 +170,10 @@ fn decode(file: BufReader<File>, length: u64, wanted: &dyn Fn(&str) -> bool) -> 
     convert_to_rec_709(&mut set, meta.headers[0].shared_attributes.chromaticities.as_ref());
     let attributes = attributes(&meta.headers);
     set.iterations = attributes.iterations();
-    Ok((set, attributes))
+    let corner = [(bounds.position.0, display.position.0), (bounds.position.1, display.position.1)];
+    let corner = corner.map(|(own, display)| own.abs_diff(display) as usize);
+    let whole = Size { width: display.size.0, height: display.size.1 };
+    Ok((Windowed { set, whole, corner }, attributes))
 }
 
 /// Whether the layer of each channel is wanted, by part and by channel.
@@ -134,8 +184,7 @@ fn wanted_channels(headers: &[Header], wanted: &dyn Fn(&str) -> bool) -> Vec<Vec
 
 /// Rejects headers that declare more data than the file can hold, before anything is allocated for them. `reads`: whether
 /// each channel is read, by part and by channel.
-fn check_size(headers: &[Header], length: u64, reads: &[Vec<bool>]) -> Outcome<()> {
-    let Some(first) = headers.first() else { return Err(invalid("no part")) };
+fn check_size(headers: &[Header], length: u64, (canvas, reads): (Vec2<usize>, &[Vec<bool>])) -> Outcome<()> {
     let window = |size: exr::math::Vec2<usize>| size.0 as u128 * size.1 as u128;
     let mut taken = 0u128;
     for (header, reads) in headers.iter().zip(reads) {
@@ -152,9 +201,7 @@ fn check_size(headers: &[Header], length: u64, reads: &[Vec<bool>]) -> Outcome<(
         {
             return Err(invalid("more pixels than the file can hold"));
         }
-        taken += window(first.shared_attributes.display_window.size)
-            * 4
-            * reads.iter().filter(|read| **read).count() as u128;
+        taken += window(canvas) * 4 * reads.iter().filter(|read| **read).count() as u128;
     }
     // The file of a small window in a large picture may be small.
     match u64::try_from(taken) {
