@@ -1,6 +1,6 @@
 """Convert a USD stage (.usd, .usda, .usdc, .usdz) to a .glb that caustique renders.
 
-    python3 scripts/usd/convert.py STAGE -o OUT.glb [--frame N] [--allow-outside]     print the files that were read
+    python3 scripts/usd/convert.py STAGE -o OUT.glb [--frame N] [--allow-outside]     print the files of the stage
     python3 scripts/usd/convert.py STAGE --arguments     print the options of `render` from its RenderSettings
 
 The script needs the packages in scripts/requirements-usd.txt, such as `usd-core`, which composes the stage. `caustique
@@ -90,7 +90,7 @@ def _convert_confined(given):
 
 
 def _convert(given):
-    """Convert and print the files that were read, or print the arguments. Returns the exit code."""
+    """Convert and print the files of the stage, or print the arguments. Returns the exit code."""
     try:
         if given.arguments:
             print(json.dumps(arguments(given.stage, given.allow_outside)))

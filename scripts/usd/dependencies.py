@@ -2,7 +2,7 @@
 
 import os
 
-from pxr import Ar, Sdf, Tf
+from pxr import Ar, Sdf, Tf, UsdUtils
 
 from faults import Fault
 
@@ -46,6 +46,15 @@ def open_layers(path, check_path):
         for clip in _clips(layer, check_path):
             waiting += _anchored(layer, _evaluated(clip, variables))
     return found
+
+
+def named_files(layer):
+    """The files that a layer names, read or not, as absolute paths."""
+    try:
+        _, assets, _ = UsdUtils.ExtractExternalReferences(layer.identifier)
+    except Tf.ErrorException:
+        return set()
+    return {os.path.abspath(outer_file(path)) for asset in assets for path in _anchored(layer, asset)}
 
 
 def _anchored(layer, asset):

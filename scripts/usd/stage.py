@@ -6,7 +6,7 @@ import re
 
 from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdSkel
 
-from dependencies import check_regular, open_layers, outer_file
+from dependencies import check_regular, named_files, open_layers, outer_file
 from faults import Fault, Invalid, Losses, check_pointer, text_of
 
 # Limits of metersPerUnit within which squared lengths neither underflow nor overflow.
@@ -36,13 +36,13 @@ class Stage:
             self.stage = Usd.Stage.Open(layers[0] if layers else self.path)
         except Tf.ErrorException as error:
             raise Fault("", f"USD cannot read it: {_first_line(error)}", "export it again; usdchecker may say more")
-        # The files that were read, as absolute paths.
+        # The files that the stage is read from or names, as absolute paths.
         self.files = {self.path}
         for layer in self.stage.GetUsedLayers():
             if layer.realPath:
                 file = outer_file(layer.realPath)
                 self.check_path(file, "the stage")
-                self.files.add(file)
+                self.files |= {file, *named_files(layer)}
         for error in self.stage.GetCompositionErrors():
             layer = re.search("@([^@]+)@", text_of(error))
             if layer and self._allows(layer[1]):

@@ -291,13 +291,17 @@ class Faults(usd_support.Stages):
     def test_the_files_of_a_stage_are_listed(self):
         """In a process of its own, which looks for files beside the stage alone."""
         (self.dir / "part.usda").write_text('#usda 1.0\n(subLayers = [@`"./${NAME}.usda"`@])\ndef Xform "B" {}\n')
-        (self.dir / "base.usda").write_text('#usda 1.0\ndef Sphere "B" {}\n')
+        # Nothing reads the image of a second dome.
+        domes = "".join(f'def DomeLight "{name}" {{\nasset inputs:texture:file = @./{name}.png@\n}}\n' for name in "ab")
+        (self.dir / "base.usda").write_text(f"#usda 1.0\n{domes}")
+        for name in "ab":
+            Image.new("RGB", (2, 1)).save(self.dir / f"{name}.png")
         stage = self.dir / "whole.usda"
         stage.write_text('#usda 1.0\n(\nexpressionVariables = {\nstring NAME = "base"\n}\nsubLayers = [@part.usda@]\n)\n')
         command = [sys.executable, usd_support.SCRIPTS / "convert.py", "whole.usda", "-o", "out.glb", "--guard", "60", "0"]
         with subprocess.Popen(command, cwd=self.dir, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as program:
             printed = program.stdout.read()
-        names = [str(self.dir / name) for name in ("base.usda", "part.usda", "whole.usda")]
+        names = [str(self.dir / name) for name in ("a.png", "b.png", "base.usda", "part.usda", "whole.usda")]
         self.assertEqual(json.loads(printed), names)
 
     def test_a_binary_stage_cut_short(self):

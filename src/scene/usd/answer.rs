@@ -24,7 +24,7 @@ pub fn options(printed: &[u8], stage: &Path) -> Result<Vec<String>> {
     parse(printed, stage, "options")
 }
 
-/// The files that the USD converter printed: those that it has read, the stage included.
+/// The files that the USD converter printed: those that the stage is read from or names, the stage included.
 ///
 /// # Errors
 /// The converter printed something else.
