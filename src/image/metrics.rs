@@ -89,7 +89,7 @@ fn errors_with_floor(a: &Picture, b: &Picture, floor: f64, outside: usize) -> Op
     let kept = count - (n * TRIMMED_SHARE) as usize;
     // The error of the black pixels is zero, the smallest.
     relative.truncate(kept.saturating_sub(outside));
-    let relmse_trimmed = relative.iter().sum::<f64>() / kept as f64;
+    let relmse_trimmed = relative.iter().fold(0.0, |sum, error| sum + error) / kept as f64;
     let mse = pixels.iter().map(|&i| squared_error(a[i], b[i])).sum::<f64>() / n;
     let total = |image: &Picture| pixels.iter().flat_map(|&i| image[i]).map(f64::from).sum::<f64>();
     let (sum_a, sum_b) = (total(a), total(b));

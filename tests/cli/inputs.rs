@@ -35,11 +35,6 @@ fn no_output_is_an_input() {
         (format!("{render} --env a.1.exr -o hard.exr"), "hard.exr", "a.1.exr"),
         (format!("{render} --env b.png -o c.exr --preview b.png"), "b.png", "b.png"),
         (format!("{render} --env a.2.exr -o a.#.exr --frames 1-2"), "a.2.exr", "a.2.exr"),
-        (
-            format!("{render} --env c.1.exr.claim -o c.#.exr --frames 1 --skip-existing"),
-            "c.1.exr.claim",
-            "c.1.exr.claim",
-        ),
         (format!("{render} --env .caustique-c.exr-abcdef.part -o c.exr"), "c.exr", ".caustique-c.exr-abcdef.part"),
         (format!("{converge} -o . --env points.csv"), "./points.csv", "points.csv"),
         (format!("{converge} -o here --env reference.exr"), "here/reference.exr", "reference.exr"),
@@ -49,6 +44,9 @@ fn no_output_is_an_input() {
         assert!(outcome.code == Some(2) && outcome.stderr.ends_with(&error), "{command}: {}", outcome.stderr);
         assert!(contents(&folder) == before, "{command}: {:?}", folder.files());
     }
+    let claimed = folder.run(&format!("{render} --env c.1.exr.claim -o c.#.exr --frames 1 --skip-existing"));
+    assert!(claimed.stderr.ends_with("c.1.exr.claim is no claim of a frame\n"), "{}", claimed.stderr);
+    assert!(claimed.code == Some(1) && contents(&folder) == before);
     for (command, one, other) in [
         (format!("{render} -o c.exr --checkpoint here/c.exr"), "here/c.exr", "c.exr"),
         (format!("{render} -o c.exr --preview here/c.exr"), "here/c.exr", "c.exr"),
