@@ -4,7 +4,7 @@ use super::progress::Form;
 use super::{output, print, print_json};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::Layer;
-use caustique::image::{Comparison, Floor, Outputs, Windowed, atomic, compare_windows, heat, png};
+use caustique::image::{Comparison, Floor, Outputs, Windowed, atomic, compare_windows, exr, heat, png};
 use caustique::report::errors;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -72,7 +72,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
 
 /// Reads the layers of an EXR. If a layer is named, it becomes the picture, without the other layers.
 fn read(path: &Path, layer: Option<&str>) -> Result<Windowed> {
-    let mut windowed = Windowed::read(path)?;
+    let mut windowed = exr::read_window(path)?;
     let set = &mut windowed.set;
     if let Some(name) = layer {
         let names: Vec<String> = set.layers.iter().map(describe_layer).collect();

@@ -5,8 +5,8 @@
 //! Optimization of HDR Color Pipelines", GDC 2016) with the parameters in the names of Blender's files; the table follows
 //! a power law. Both were found from the values of Blender's OpenColorIO configuration, which they meet within 0.1 / 255.
 
-use super::tonemap::Contrast;
 use crate::math::Rgb;
+use crate::scene::description::Contrast;
 use glam::Vec3;
 
 /// Scene-linear value of middle grey, which is shown as a half.

@@ -1,10 +1,8 @@
 //! A picture within the window that its file holds, outside which it is black.
 
-use super::exr;
 use crate::error::{Error, ErrorKind, Result};
 use crate::film::{Layer, LayerSet, Plane, Size};
 use crate::memory;
-use std::path::Path;
 
 /// The layers of a picture within a window of it. Outside the window, it is black.
 pub struct Windowed {
@@ -17,14 +15,6 @@ pub struct Windowed {
 }
 
 impl Windowed {
-    /// Reads an EXR within the data windows of its parts, so that it takes memory for what the file holds.
-    ///
-    /// # Errors
-    /// As for [`exr::read`].
-    pub fn read(path: &Path) -> Result<Windowed> {
-        exr::read_window(path)
-    }
-
     /// Number of black pixels outside the window.
     pub fn outside(&self) -> usize {
         self.whole.width * self.whole.height - self.set.pixels()

@@ -4,7 +4,7 @@
 use caustique::film::{Layer, LayerSet, Picture, Size};
 use caustique::image::exr::{self, Attributes, Frame};
 use caustique::image::tonemap::{Contrast, Look, ToneMap, srgb_decode};
-use caustique::image::{Floor, Windowed, compare, compare_windows, compare_with_floor, flip, heat, metrics};
+use caustique::image::{Floor, compare, compare_windows, compare_with_floor, flip, heat, metrics};
 use caustique::math::Rgb;
 
 const WIDTH: usize = 96;
@@ -350,7 +350,7 @@ fn windows_have_the_errors_of_whole_pictures() {
     };
     for (whole, [one, other]) in [([140, 100], [[7, 5], [40, 30]]), ([96, 150], [[0, 40], [0, 86]])] {
         let paths = [write("a.exr", &test, whole, one), write("b.exr", &reference, whole, other)];
-        let [a, b] = paths.each_ref().map(|path| Windowed::read(path).expect("it can be read"));
+        let [a, b] = paths.each_ref().map(|path| exr::read_window(path).expect("it can be read"));
         let [c, d] = paths.each_ref().map(|path| exr::read(path).expect("it can be read").0);
         assert_eq!((a.set.size(), a.expand().expect("there is memory")), (SIZE, c.clone()));
         for floor in [Floor::Papers, Floor::Relative] {
@@ -373,7 +373,7 @@ fn windows_have_the_errors_of_whole_pictures() {
     }
     // A display window of a million rows costs nothing.
     let paths = [write("a.exr", &test, [96, 1 << 20], [0, 5]), write("b.exr", &reference, [96, 1 << 20], [0, 9])];
-    let [a, b] = paths.each_ref().map(|path| Windowed::read(path).expect("it can be read"));
+    let [a, b] = paths.each_ref().map(|path| exr::read_window(path).expect("it can be read"));
     let (_, [joined, _]) = compare_windows(&a, &b, Floor::Papers).expect("they can be compared");
     assert_eq!((a.set.size(), joined.set.size().height), (SIZE, 9 + HEIGHT + 16));
 }

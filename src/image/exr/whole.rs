@@ -89,6 +89,11 @@ mod tests {
             write(&path, &set, &Attributes::default(), options).expect("it can be written");
             check_whole(&path).expect("it is whole");
             let whole = std::fs::read(&path).expect("it can be read");
+            // Numbers of the last chunk that are stored as they are may be zero; others end in a checksum.
+            let undetected = match compression {
+                Compression::Zip | Compression::Zips => 4,
+                Compression::Piz | Compression::None => 4 * 16 * 6 * 4,
+            };
             for i in 0..50 {
                 let cut = crate::random::mix(i) as usize % whole.len();
                 std::fs::write(&path, &whole[..cut]).expect("it can be written");
@@ -96,7 +101,8 @@ mod tests {
                 let mut holed = whole.clone();
                 holed[cut..].fill(0);
                 std::fs::write(&path, &holed).expect("it can be written");
-                assert!(check_whole(&path).is_err() || cut > whole.len() - 4, "zeros from {cut} of {}", whole.len());
+                let found = check_whole(&path).is_err() || cut > whole.len() - undetected;
+                assert!(found, "{compression:?}: zeros from {cut} of {}", whole.len());
             }
             // Data behind the chunks is allowed: shards have it.
             std::fs::write(&path, [whole, vec![1; 100]].concat()).expect("it can be written");

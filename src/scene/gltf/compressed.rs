@@ -3,8 +3,9 @@
 
 use super::container::MESHOPT;
 use super::document::{Document, at, extension};
-use super::{draco, fault};
-use crate::error::{Error, Result};
+use super::draco;
+use super::isolated::{count_bytes, damaged};
+use crate::error::Result;
 use serde::Deserialize;
 
 /// Content of EXT_meshopt_compression and KHR_meshopt_compression.
@@ -52,10 +53,6 @@ impl Filter {
     }
 }
 
-/// Bytes of a decoded element that a compressed byte can at most stand for, as a bound on what a small file may
-/// allocate: both codecs reach about a thousand for constant data.
-const MAX_RATIO: u64 = 1 << 12;
-
 /// Decodes the compressed buffer views and primitives of a document. A primitive whose accessors have data of their own
 /// keeps them.
 ///
@@ -73,22 +70,6 @@ pub(super) fn decode(document: &mut Document) -> Result<()> {
         }
     }
     draco::decode(document)
-}
-
-/// The error about compressed data that cannot be decoded.
-pub(super) fn damaged(cause: impl std::fmt::Display) -> Error {
-    fault("", format!("its data cannot be decoded: {cause}")).hint(
-        "the file is damaged: export it again, or decompress it elsewhere with 'gltf-transform copy IN.glb OUT.glb'",
-    )
-}
-
-/// Counts the memory of `bytes` decoded bytes, of `compressed` ones.
-pub(super) fn count_bytes(document: &Document, bytes: u64, compressed: usize) -> Result<()> {
-    if bytes > (compressed as u64).saturating_mul(MAX_RATIO) {
-        return Err(damaged(format!("{compressed} bytes do not hold {bytes}")));
-    }
-    let error = document.count_bytes(bytes, "decompressed data");
-    error.map_err(|e| e.hint("render fewer or simpler meshes, or with more memory"))
 }
 
 /// The bytes of a buffer view that meshoptimizer has compressed.

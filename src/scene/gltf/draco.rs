@@ -1,9 +1,8 @@
 //! Geometry that Draco has compressed (KHR_draco_mesh_compression). Its decoder runs in a process of its own: it believes
 //! the sizes in the data, and indexes without checks.
 
-use super::compressed::{count_bytes, damaged};
 use super::document::{Document, extension, get, named};
-use super::isolated::{self, Decoded};
+use super::isolated::{self, Decoded, count_bytes, damaged};
 use crate::error::{Error, Result};
 use draco_oxide_core::attribute::{Attribute, ComponentDataType};
 use draco_oxide_core::types::PointIdx;

@@ -1,7 +1,9 @@
 //! Decoders of foreign data, run in a process of their own: they believe the sizes in a file, and an allocation that
 //! fails ends its process.
 
-use crate::error::Result;
+use super::document::Document;
+use super::fault;
+use crate::error::{Error, Result};
 use crate::memory;
 use caustique_isolated::{Ending, Limits};
 use std::io::{self, Read, Write};
@@ -16,8 +18,28 @@ const BASE_SECONDS: u64 = 10;
 /// Decoded bytes for which a decoder may take another second, a hundredth of what the slowest one decodes.
 const BYTES_PER_SECOND: u64 = 1 << 18;
 
+/// Bytes of a decoded element that a compressed byte can at most stand for, as a bound on what a small file may
+/// allocate: both codecs reach about a thousand for constant data.
+const MAX_RATIO: u64 = 1 << 12;
+
 /// What a decoder has made, or why it failed.
 pub(super) type Decoded = std::result::Result<Vec<u8>, String>;
+
+/// The error about compressed data that cannot be decoded.
+pub(super) fn damaged(cause: impl std::fmt::Display) -> Error {
+    fault("", format!("its data cannot be decoded: {cause}")).hint(
+        "the file is damaged: export it again, or decompress it elsewhere with 'gltf-transform copy IN.glb OUT.glb'",
+    )
+}
+
+/// Counts the memory of `bytes` decoded bytes, of `compressed` ones.
+pub(super) fn count_bytes(document: &Document, bytes: u64, compressed: usize) -> Result<()> {
+    if bytes > (compressed as u64).saturating_mul(MAX_RATIO) {
+        return Err(damaged(format!("{compressed} bytes do not hold {bytes}")));
+    }
+    let error = document.count_bytes(bytes, "decompressed data");
+    error.map_err(|e| e.hint("render fewer or simpler meshes, or with more memory"))
+}
 
 /// Runs `decode` for `0..count` in one process of its own, up to the first failure. `bytes`: the size of all decoded
 /// data. Fewer results than `count` mean that the process has ended, for the reason in the last result.

@@ -42,6 +42,7 @@ const UNSAID: [(&str, &[&str]); 7] = [
             "its {key} is not {N} numbers",
             "it has no texels",
             "its texels are neither of 8 nor of 16 bits",
+            "its texels are not of 8 bits",
             "the display window has no pixels",
             "part index",
             "the file is deep",
@@ -58,6 +59,9 @@ const UNSAID: [(&str, &[&str]); 7] = [
         "decoders have no fault that is known",
         &[
             "it cannot be decoded: the decoder failed",
+            "the decoder takes more than {seconds} s",
+            "the decoder asks for more than {} MiB",
+            "no process for its decoder can be started: {error}",
             "the decoder failed",
             "the file contradicts itself",
             "its size contradicts its header",
