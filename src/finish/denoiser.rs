@@ -2,7 +2,7 @@
 
 use super::Estimate;
 use super::bound::spread;
-use super::hue::keep_grey;
+use super::grey::keep_grey;
 use super::statistical;
 use crate::error::{Error, ErrorKind, Result};
 use crate::film::{Picture, Size};

@@ -17,7 +17,7 @@ mod conserve;
 pub mod denoiser;
 mod estimate;
 mod finished_error;
-mod hue;
+mod grey;
 pub mod parts;
 pub mod statistical;
 pub mod temporal;
