@@ -159,7 +159,7 @@ mod tests {
         let (denoised, spread) = (Picture::filled(SIZE, [constant; 3]), spread(estimate));
         let (within, _) =
             displace(&estimate.mean, &denoised, Noise::new(estimate, &spread), &brightest(&estimate.mean));
-        let (whole, _) = bounded(&estimate.mean, &denoised, Noise::new(&estimate, &spread));
+        let (whole, _) = bounded(&estimate.mean, &denoised, Noise::new(estimate, &spread));
         [within, whole]
     }
 

@@ -208,7 +208,7 @@ impl Distribution {
         rows.dedup();
         let knots = azimuth.iter().copied().chain([-0.25, 0.0, 0.25]);
         let columns = edges(turns[0], turns[1], step(turns, MAX_AZIMUTH_STEP), knots);
-        let height = |at: Vec2| Self::height(profile.from_pole(Self::around_pole(at)));
+        let height = |at: Vec2| Self::height(profile.direction_from_pole(Self::around_pole(at)));
         let corners = rows.iter().flat_map(|&row| columns.iter().map(move |&column| Vec2::new(row, column)));
         let widest = corners.map(height).fold(0.0, f32::max) + 4.0 * f32::EPSILON;
         let reach = cone.map_or(widest, |cone| widest.min(cone.outer)).min(2.0);
@@ -364,7 +364,7 @@ impl Distribution {
     pub fn sample(&self, u: Vec2) -> Option<(Vec3, f32)> {
         let (at, density) = self.grid.sample(u)?;
         match &*self.pattern {
-            Pattern::Profile(profile) => Some((profile.from_pole(Self::around_pole(at)), density / TAU)),
+            Pattern::Profile(profile) => Some((profile.direction_from_pole(Self::around_pole(at)), density / TAU)),
             Pattern::Picture(picture) => Some((picture.direction(at), density / picture.solid_angle(at))),
         }
     }

@@ -85,7 +85,7 @@ impl Profile {
 
     /// A direction in the frame of the pole, in the frame of the light.
     #[inline]
-    pub(super) fn from_pole(&self, d: Vec3) -> Vec3 {
+    pub(super) fn direction_from_pole(&self, d: Vec3) -> Vec3 {
         self.to_pole.map_or(d, |to_pole| to_pole.transpose() * d)
     }
 

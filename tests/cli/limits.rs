@@ -5,7 +5,6 @@ use caustique::image::exr;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
 
 /// Runs the program under limits of the shell.
 fn limited(folder: &Folder, limits: &str, arguments: &str) -> Outcome {
@@ -101,10 +100,8 @@ fn closed_white_rooms_are_rendered_or_name_max_depth() {
     let folder = Folder::new();
     write_white_room(&folder);
     let render = "render room.gltf -o out.exr --width 16 --height 9 --denoise none --progress none";
-    let start = Instant::now();
     let auto = folder.run(&format!("{render} --time 1"));
     assert_eq!(auto.code, Some(0), "{}", auto.stderr);
-    assert!(start.elapsed() < Duration::from_secs(30), "{:?}", start.elapsed());
     let vcm = folder.run(&format!("{render} --method vcm --time 1"));
     assert_eq!(vcm.code, Some(2), "{}", vcm.stderr);
     assert!(vcm.stderr.contains("has not ended after 8 s") && vcm.stderr.contains("--max-depth"), "{}", vcm.stderr);

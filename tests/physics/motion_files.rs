@@ -178,6 +178,8 @@ fn a_light_that_is_dark_at_the_frame_is_blurred() {
     let lamp =
         json!({"name": "ball", "translation": [0.3, 0.6, 0.0], "extensions": {"KHR_lights_punctual": {"light": 0}}});
     file.node(lamp);
+    // Each still would guess the unit from its own intensity.
+    file.json["scenes"][0]["extras"] = json!({"caustique": {"light_units": "photometric"}});
     animate(&mut file, pointer("/extensions/KHR_lights_punctual/lights/0/intensity"), [[-9000.0], [9000.0]]);
     is_mean_of_stills("dark light", &file, Method::Path, 256, 0.005);
     is_mean_of_stills("dark light", &file, Method::Vcm, 256, 0.03);

@@ -262,7 +262,8 @@ fn fires_light_from_where_they_are_seen() {
     let (centre, aside) = (DVec3::Y * 2.0, DVec3::new(0.25, 1.75, 0.25));
     let place = |at: DVec3, half: f64| DAffine3::from_translation(at) * DAffine3::from_scale(DVec3::splat(half));
     let inner = || cuboid(Vec3::splat(-0.5), Vec3::splat(0.5), false);
-    let scenes: [(&str, Option<(caustique::geometry::Mesh, Material, f64)>, f32); 5] = [
+    type Other = Option<(caustique::geometry::Mesh, Material, f64)>;
+    let scenes: [(&str, Other, f32); 5] = [
         ("alone", None, 1.0),
         ("alpha", None, 0.4),
         ("displaced", Some((domain(), Material { priority: 1, ..glass(1.0) }, 0.0)), 1.0),

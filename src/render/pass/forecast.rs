@@ -36,7 +36,7 @@ pub fn photons_per_path(scene: &Scene, camera: &Camera, settings: &Settings) -> 
     let (mut traced, mut found) = (0, 0);
     while traced < SAMPLED_PATHS && found < MAX_PHOTONS {
         let chunks = (traced..traced + BATCH).into_par_iter().step_by(CHUNK as usize);
-        found += chunks.map(photons).sum::<usize>();
+        found += chunks.map(photons).collect::<Vec<usize>>().into_iter().sum::<usize>();
         traced += BATCH;
     }
     found as f64 / f64::from(traced)
