@@ -19,8 +19,7 @@ pub use pilot_settings::pilot_settings;
 pub use weights::EffectWeight;
 
 use crate::camera::Camera;
-use crate::plan::Effect;
-use crate::render::{Candidate, Clock, Cost, Method, RenderInput, Session, Settings, TimeSpent};
+use crate::render::{Candidate, Clock, Cost, RenderInput, Session, Settings, TimeSpent};
 use crate::scene::{Scene, View};
 use crate::stop::Stop;
 use pilot::Pilot;
@@ -104,8 +103,8 @@ fn candidate_without_pilot(
     let all: Vec<(Candidate, f64)> = usual.chain(cheaper).filter_map(with_seconds).collect();
     let least = all.iter().map(|(_, seconds)| *seconds).fold(f64::INFINITY, f64::min);
     // Cheap candidates are no alternative where they miss light that the usual ones find.
-    let alike = Method::Vcm.search().finds(Effect::Sds, &view.scene.survey);
-    let most = if alike { pilot::MAX_COST_RATIO * least } else { f64::INFINITY };
+    let misses_light = pilot::default_misses_light(view.scene);
+    let most = if misses_light { f64::INFINITY } else { pilot::MAX_COST_RATIO * least };
     let longest = pilot.longest_iteration(least, 0.0).min(most);
     all.iter().find(|(_, seconds)| *seconds <= longest).map_or(Candidate::GATHERING, |(candidate, _)| *candidate)
 }

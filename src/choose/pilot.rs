@@ -95,11 +95,16 @@ impl PilotResult {
 pub(super) fn candidates_for_focused_light(scene: &Scene) -> &'static [Candidate] {
     if scene.lights.targets().spheres().is_empty() {
         &[]
-    } else if Method::Vcm.search().finds(Effect::Sds, &scene.survey) {
-        &[Candidate::GUIDED, Candidate::DEFAULT]
-    } else {
+    } else if default_misses_light(scene) {
         &[Candidate::GUIDED_GATHERING, Candidate::GATHERING, Candidate::GUIDED, Candidate::DEFAULT]
+    } else {
+        &[Candidate::GUIDED, Candidate::DEFAULT]
     }
+}
+
+/// Whether the default candidate misses caustics behind glass or in mirrors that guided photons find.
+pub(super) fn default_misses_light(scene: &Scene) -> bool {
+    !Method::Vcm.search().finds(Effect::Sds, &scene.survey)
 }
 
 fn pixel_count(camera: &Camera) -> f64 {
@@ -197,7 +202,7 @@ impl<'a> Pilot<'a> {
         late: &dyn Fn() -> bool,
     ) -> (Vec<PilotResult>, Option<&'static str>) {
         let scene = self.view.scene;
-        let misses_light = !Method::Vcm.search().finds(Effect::Sds, &scene.survey);
+        let misses_light = default_misses_light(scene);
         let focused = !candidates_for_focused_light(scene).is_empty();
         if misses_light && focused {
             return (
