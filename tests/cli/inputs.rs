@@ -34,7 +34,7 @@ fn no_output_is_an_input() {
         ("compare b.html a.1.exr --page here/b.html".into(), "here/b.html", "b.html"),
         (format!("{render} --env a.1.exr -o hard.exr"), "hard.exr", "a.1.exr"),
         (format!("{render} --env b.png -o c.exr --preview b.png"), "b.png", "b.png"),
-        (format!("{render} --env a.2.exr -o a.#.exr --frames 1-2"), "a.2.exr", "a.2.exr"),
+        (format!("{render} --env a.1.exr -o a.#.exr --frames 1-2"), "a.1.exr", "a.1.exr"),
         (format!("{render} --env .caustique-c.exr-abcdef.part -o c.exr"), "c.exr", ".caustique-c.exr-abcdef.part"),
         (format!("{converge} -o . --env points.csv"), "./points.csv", "points.csv"),
         (format!("{converge} -o here --env reference.exr"), "here/reference.exr", "reference.exr"),

@@ -105,7 +105,6 @@ fn closed_white_rooms_are_rendered_or_name_max_depth() {
     let auto = folder.run(&format!("{render} --time 1"));
     assert_eq!(auto.code, Some(0), "{}", auto.stderr);
     assert!(start.elapsed() < Duration::from_secs(30), "{:?}", start.elapsed());
-    assert!(folder.read("out.exr").1["iterations"].as_u64() > Some(1));
     let vcm = folder.run(&format!("{render} --method vcm --time 1"));
     assert_eq!(vcm.code, Some(2), "{}", vcm.stderr);
     assert!(vcm.stderr.contains("has not ended after 8 s") && vcm.stderr.contains("--max-depth"), "{}", vcm.stderr);
