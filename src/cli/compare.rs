@@ -3,8 +3,8 @@
 use super::progress::Form;
 use super::{output, print, print_json};
 use caustique::error::{Error, ErrorKind, Result};
-use caustique::film::{Layer, LayerSet};
-use caustique::image::{Comparison, Floor, atomic, compare_with_floor, exr, heat, png};
+use caustique::film::{Layer, LayerSet, Size};
+use caustique::image::{Comparison, Floor, Inside, atomic, compare_with_floor, exr, heat, png, smooth_pixels};
 use caustique::report::errors;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,8 @@ use std::path::{Path, PathBuf};
 ///
 /// relMSE is the mean over pixels of the squared difference over the squared reference plus 0.01; trimmed leaves out
 /// the worst 0.5 % of pixels. FLIP estimates the visible difference when one image replaces the other. Grain is the part
-/// of relMSE that neighbouring pixels do not share: the mean over 3 x 3 pixels is subtracted from the error.
+/// of relMSE that neighbouring pixels do not share: the mean over 3 x 3 pixels is subtracted from the error. The errors inside
+/// glass and mirrors are those of the pixels that show smooth glass or a mirror.
 #[derive(clap::Args)]
 pub struct CompareArgs {
     /// EXR to measure
@@ -29,6 +30,10 @@ pub struct CompareArgs {
     /// independent of the brightness of the lamps
     #[arg(long)]
     relative: bool,
+    /// EXR whose pixels show glass and mirrors, by its cryptomatte of materials, or where the first channel of LAYER is above
+    /// 0.5 [default: A.exr, else B.exr]
+    #[arg(long, value_name = "FILE[:LAYER]")]
+    mask: Option<PathBuf>,
     /// Also write a heat map of FLIP: black is no difference, pale yellow a large one
     #[arg(long, value_name = "FILE.png")]
     png: Option<PathBuf>,
@@ -49,11 +54,18 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     if let Some(page) = &args.page {
         output::check(page, "html")?;
     }
-    let image = read(&args.image, args.layer.as_deref())?;
-    let reference = read(&args.reference, args.layer.as_deref())?;
+    let (image, of_image) = read(&args.image, args.layer.as_deref())?;
+    let (reference, of_reference) = read(&args.reference, args.layer.as_deref())?;
+    let inside = match &args.mask {
+        Some(mask) => Some(read_mask(mask, image.size())?),
+        None => of_image.or(of_reference.filter(|mask| mask.len() == image.pixels())),
+    };
     let floor = if args.relative { Floor::Relative } else { Floor::Papers };
     let compared = Form::for_output(args.json).during("comparing", || compare_with_floor(&image, &reference, floor));
-    let comparison = compared.map_err(|e| e.within(args.image.display()))?;
+    let mut comparison = compared.map_err(|e| e.within(args.image.display()))?;
+    if let Some(inside) = &inside {
+        comparison.measure_inside(inside);
+    }
     if let Some(path) = &args.png {
         let colours = comparison.flip_map.iter().map(|&error| heat::magma(error));
         png::write(path, image.size(), colours)?;
@@ -66,19 +78,52 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     if args.json { print_json(&json!(comparison)) } else { print(&text(&comparison)) }
 }
 
-/// Reads the layers of an EXR. If a layer is named, it becomes the picture, without the other layers.
-fn read(path: &Path, layer: Option<&str>) -> Result<LayerSet> {
-    let (mut set, _) = exr::read(path)?;
+/// Reads the layers of an EXR, and which of its pixels show smooth glass or a mirror, if it says so. If a layer is named, it
+/// becomes the picture, without the other layers.
+fn read(path: &Path, layer: Option<&str>) -> Result<(LayerSet, Option<Vec<bool>>)> {
+    let (mut set, attributes) = exr::read(path)?;
+    let inside = smooth_pixels(&set, &attributes);
     if let Some(name) = layer {
-        let names: Vec<String> = set.layers.iter().map(describe_layer).collect();
-        set.layers.retain(|layer| layer.name == name);
-        let Some(layer) = set.layers.first_mut() else {
-            let error = Error::new(ErrorKind::Usage, path.display(), format!("there is no layer \"{name}\""));
-            return Err(error.hint(format!("it has {}", names.join(", "))));
-        };
-        layer.name.clear();
+        name_picture(&mut set, path, name)?;
     }
-    Ok(set)
+    Ok((set, inside))
+}
+
+/// Makes the layer of this name the picture, and removes the other layers.
+fn name_picture(set: &mut LayerSet, path: &Path, name: &str) -> Result<()> {
+    let names: Vec<String> = set.layers.iter().map(describe_layer).collect();
+    set.layers.retain(|layer| layer.name == name);
+    let Some(layer) = set.layers.first_mut() else {
+        let error = Error::new(ErrorKind::Usage, path.display(), format!("there is no layer \"{name}\""));
+        return Err(error.hint(format!("it has {}", names.join(", "))));
+    };
+    layer.name.clear();
+    Ok(())
+}
+
+/// Reads the argument of --mask, `FILE` or `FILE:LAYER`, for pictures of this size.
+fn read_mask(argument: &Path, size: Size) -> Result<Vec<bool>> {
+    let text = argument.to_string_lossy();
+    let (path, layer) = match text.rsplit_once(':').filter(|_| !argument.exists()) {
+        Some((path, layer)) => (Path::new(path), Some(layer)),
+        None => (argument, None),
+    };
+    let fault = |cause: String| Error::new(ErrorKind::Usage, path.display(), cause);
+    let (set, inside) = read(path, layer)?;
+    if set.size() != size {
+        let cause = format!("{} x {} pixels, not {} x {}", set.width, set.height, size.width, size.height);
+        return Err(fault(cause).hint("render the mask with the --width and --height of the pictures"));
+    }
+    if layer.is_some() {
+        let first = set.get("").and_then(|layer| layer.planes.first());
+        return first
+            .map(|plane| plane.values.iter().map(|value| *value > 0.5).collect())
+            .ok_or_else(|| fault("its layer is empty".into()));
+    }
+    inside.ok_or_else(|| {
+        let error = fault("it does not say which pixels show glass and mirrors".into());
+        error.hint("render it with --layers that include CryptoMaterial, or name a layer: FILE:LAYER")
+    })
 }
 
 /// The name of a layer for messages, or the channels of the beauty layer, which has no name.
@@ -89,7 +134,7 @@ fn describe_layer(layer: &Layer) -> String {
 
 fn text(comparison: &Comparison) -> String {
     let ratio = comparison.mean_ratio.map_or("the reference is black".into(), |ratio| format!("{ratio:.6}"));
-    format!(
+    let whole = format!(
         "relMSE            {:.6e}\nrelMSE, trimmed   {:.6e}\nMSE               {:.6e}\nmean ratio        {ratio}\n\
          FLIP              {:.6}\ngrain             {:.6e}\npixels not finite {}\n",
         comparison.relmse,
@@ -98,5 +143,12 @@ fn text(comparison: &Comparison) -> String {
         comparison.flip,
         comparison.grain,
         comparison.pixels_not_finite
-    )
+    );
+    let inside = comparison.inside.map_or_else(String::new, |Inside { pixels, relmse, flip, grain }| {
+        format!(
+            "in glass and mirrors, {pixels} pixels:\n  relMSE          {relmse:.6e}\n  FLIP            {flip:.6}\n  \
+             grain           {grain:.6e}\n"
+        )
+    });
+    whole + &inside
 }

@@ -5,9 +5,11 @@ pub mod exr;
 mod filmic;
 pub mod flip;
 pub mod heat;
+pub mod inside;
 pub mod metrics;
 pub mod png;
 pub mod tonemap;
 pub mod usd_layer;
 
-pub use metrics::{Comparison, Errors, Floor, compare, compare_with_floor, errors, relative_squared_error};
+pub use inside::{SMOOTH_MATERIALS, smooth_pixels};
+pub use metrics::{Comparison, Errors, Floor, Inside, compare, compare_with_floor, errors, relative_squared_error};
