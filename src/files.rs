@@ -1,6 +1,6 @@
 //! Files that a user or a scene names: read without waiting for pipes and devices, and told apart under all their names.
 //!
-//! What depends on the operating system stands in [`system`].
+//! What depends on the operating system stands in its module `system`.
 
 use std::ffi::OsString;
 use std::fs::{self, File};
