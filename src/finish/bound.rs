@@ -8,8 +8,8 @@
 //! a high percentile of its neighbours' standard errors, because a pixel that no rare bright sample has hit yet
 //! underestimates its own. `c` is 3 for many samples. The standard error of few samples is itself uncertain, so that `c`
 //! is the quantile of Student's distribution that excludes as much as three standard deviations of a normal one: 3.3
-//! for 32 samples, 9.2 for 4, and no bound for one. As `s` falls with the iterations, so does the displacement: for any `D` the picture converges
-//! to the limit of `M` (`docs/theory.md`). The result is clamped between zero and the brightest estimate around; clamped
+//! for 32 samples, 9.2 for 4, and no bound for one. As `s` falls with the iterations, so does the displacement: for any
+//! `D` the picture converges to the limit of `M` (`docs/theory.md`). The result is clamped between zero and the brightest estimate around; clamped
 //! pixels are counted.
 
 use super::Estimate;
@@ -38,6 +38,7 @@ pub fn limit(samples: Option<u64>) -> f32 {
         }
     }
 }
+
 /// Pixels to each side of a pixel in the window whose standard errors and brightest estimate limit it.
 pub const REACH: usize = 3;
 /// Percentile of the standard errors in a window that a pixel's spread is at least, as a share of the window, 0 to 1.
@@ -247,15 +248,7 @@ mod tests {
     }
 
     fn estimate(mean: &Picture, deviation: Picture) -> Estimate {
-        Estimate {
-            mean: mean.clone(),
-            deviation,
-            albedo: None,
-            normal: None,
-            clean_guides: false,
-            alpha: None,
-            samples: None,
-        }
+        Estimate::unguided(mean.clone(), deviation)
     }
 
     fn bounded(mean: &Picture, denoised: &Picture, spread: &Picture) -> Picture {

@@ -41,7 +41,8 @@ struct Balance<'a> {
 }
 
 /// Moves the estimate `mean` of the whole picture or of a part towards `denoised` within the bound ([`displace`]), and gives
-/// back the light that this loses, if there is a bound. `noise` belongs to the whole picture. Also counts the pixels that the bound has clamped.
+/// back the light that this loses, if there is a bound. `noise` belongs to the whole picture. Also counts the pixels that
+/// the bound has clamped.
 pub fn bounded(mean: &Picture, denoised: &Picture, noise: Noise<'_>) -> (Picture, Clamped) {
     let brightest = brightest(mean);
     let (mut picture, clamped) = displace(mean, denoised, noise, &brightest);
@@ -147,7 +148,7 @@ mod tests {
             [[unit * (0.1 + hits * of_one); 3], [unit * (0.01 + hits.sqrt() * of_one); 3]]
         };
         let [mean, deviation] = [0, 1].map(|which| Picture::from_fn(SIZE, |index| pixel(index)[which]));
-        Estimate { mean, deviation, albedo: None, normal: None, clean_guides: false, alpha: None, samples: None }
+        Estimate::unguided(mean, deviation)
     }
 
     fn mean(picture: &Picture) -> f32 {

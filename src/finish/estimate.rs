@@ -30,6 +30,13 @@ pub struct Estimate {
 }
 
 impl Estimate {
+    /// An estimate without guides and alpha, of an unknown number of samples.
+    #[cfg(test)]
+    pub(super) fn unguided(mean: Picture, deviation: Picture) -> Estimate {
+        let (albedo, normal, alpha, samples) = (None, None, None, None);
+        Estimate { mean, deviation, albedo, normal, clean_guides: false, alpha, samples }
+    }
+
     /// The estimate in a picture of caustique (`Noisy`, `Variance1`, ...) or of another renderer: its beauty, and its
     /// layer `Variance` (of the mean) or two independent halves, `Half1` and `Half2` or `HalfA` and `HalfB`. Albedo and
     /// normal are found by the names of the common renderers.

@@ -77,15 +77,7 @@ mod tests {
     /// An estimate with `error` as the standard error of every pixel.
     fn estimate(mean: &Picture, error: f32) -> Estimate {
         let deviation = Picture::filled(mean.size(), [error; 3]);
-        Estimate {
-            mean: mean.clone(),
-            deviation,
-            albedo: None,
-            normal: None,
-            clean_guides: false,
-            alpha: None,
-            samples: None,
-        }
+        Estimate::unguided(mean.clone(), deviation)
     }
 
     #[test]

@@ -520,15 +520,7 @@ mod tests {
         let halves = [quarters[0].average(&quarters[1]), quarters[2].average(&quarters[3])];
         let mean = halves[0].average(&halves[1]);
         let deviation = Picture::filled(size, [sigma; 3]);
-        let estimate = Estimate {
-            mean: mean.clone(),
-            deviation,
-            albedo: None,
-            normal: None,
-            clean_guides: false,
-            alpha: None,
-            samples: None,
-        };
+        let estimate = Estimate::unguided(mean.clone(), deviation);
         let half = Some([halves[0].clone(), halves[0].clone()]);
         let pictures = Pictures { estimate, denoised: mean, half, combined: None, is_denoised: false };
         Frame::new(pictures, Vec::new(), vec![[0.0; 4]; size.pixels()], correlation(size, Some(quarters)))
