@@ -374,10 +374,10 @@ fn bake(mesh: &mut Mesh, to_world: &DAffine3) {
     }
 }
 
-/// The properties of a material that Embree's hit filters use: how alpha acts at each hit, and whether all rays pass
-/// through the surface.
-pub(super) fn hit_behaviour(material: &Material) -> (Alpha, bool) {
-    (material.alpha_per_hit(), material.null_bsdf)
+/// The properties of a material that Embree's hit filters use: how alpha acts at each hit, whether all rays pass through
+/// the surface, and whether it bounds a solid.
+pub(super) fn hit_behaviour(material: &Material) -> (Alpha, bool, bool) {
+    (material.alpha_per_hit(), material.null_bsdf, material.is_solid())
 }
 
 /// Commits the shapes to Embree. Returns an Embree scene of all shapes except lights that all rays pass through, and
@@ -423,15 +423,15 @@ pub(super) fn random_cutoff(token: u32, instance: u32, key: u32) -> f32 {
 }
 
 /// The filter of Embree's hits: rejects hits of camera rays on instances hidden from cameras, and hits on surfaces that
-/// the ray passes because of alpha.
+/// the ray passes because of alpha. Camera rays hit hidden solids, because they keep track of the solids around them.
 pub(super) fn hit_filter(shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> HitFilter {
     let (shapes, materials) = (Arc::clone(shapes), Arc::clone(materials));
     Arc::new(move |instance, primitive, barycentric, token| {
         let placed = &shapes.instances[instance as usize];
-        if placed.hidden_from_camera && token & CAMERA_RAY_BIT != 0 {
+        let material = &materials.list[placed.material as usize];
+        if placed.hidden_from_camera && token & CAMERA_RAY_BIT != 0 && !material.is_solid() {
             return false;
         }
-        let material = &materials.list[placed.material as usize];
         let cutoff = match material.alpha_per_hit() {
             Alpha::Opaque => return true,
             Alpha::Mask(cutoff) => cutoff,

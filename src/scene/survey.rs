@@ -11,6 +11,8 @@ pub struct Survey {
     pub alpha: bool,
     /// Whether some instance is hidden from cameras.
     pub hidden_from_camera: bool,
+    /// Whether some solid is hidden from cameras.
+    pub hidden_solids: bool,
     /// Whether camera rays pass through the back faces of some surface.
     pub culled: bool,
     /// Whether some mesh bounds a solid that light enters.
@@ -49,7 +51,7 @@ impl Survey {
     /// at one of its ends.
     #[inline]
     pub fn shadow_rays_end_at_surfaces(&self) -> bool {
-        !(self.media || self.null_boundaries || self.culled)
+        !(self.media || self.null_boundaries || self.culled || self.hidden_solids)
     }
 
     /// Finds out which kinds of things a scene contains.
@@ -65,6 +67,8 @@ impl Survey {
         for instance in &shapes.instances {
             uses[instance.material as usize] += 1;
             survey.hidden_from_camera |= instance.hidden_from_camera;
+            survey.hidden_solids |=
+                instance.hidden_from_camera && materials.list[instance.material as usize].is_solid();
             survey.catchers |= instance.shadow_catcher;
         }
         let (mut solids, mut perfect, mut sharp) = (0, false, false);

@@ -265,7 +265,9 @@ impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
                     chance_before: self.chance,
                 });
             }
-            if techniques.camera && self.shared.connects_camera() {
+            let scene = camera_paths.scene;
+            let hidden = scene.survey.hidden_solids && vertex.arrival.interior.is_hidden(scene);
+            if techniques.camera && self.shared.connects_camera() && !hidden {
                 self.connect_camera(vertex);
             }
         }

@@ -96,11 +96,13 @@ impl CameraPaths<'_> {
         let draws = stream.vertex(0);
         let film = self.camera.film_point(pixel, within);
         let ray = self.camera.ray(film, draws.two(Purpose::Lens));
+        let interior = self.interior.at(self.scene, ray.origin).decided(self.scene, draws);
+        let seen = if self.scene.survey.hidden_solids { interior.seen_radiance(self.scene) } else { 1.0 };
         PathStart {
             origin: ray.origin,
             direction: ray.direction,
-            throughput: Rgb::ONE,
-            interior: self.interior.at(self.scene, ray.origin).decided(self.scene, draws),
+            throughput: Rgb::splat(seen),
+            interior,
             leaving: None,
             first: PrecomputedHit::Unknown,
             far: false,

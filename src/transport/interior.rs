@@ -303,6 +303,29 @@ impl Interior {
         if self.outer == EMPTY_STACK { inner } else { stronger(scene, self.outer, inner) }
     }
 
+    /// Whether a solid that is hidden from cameras fills the space around the path.
+    #[cold]
+    pub fn is_hidden(&self, scene: &Scene) -> bool {
+        self.host(scene).is_some_and(|instance| scene.shapes.instances[instance as usize].hidden_from_camera)
+    }
+
+    /// Radiance that a camera in these solids measures, relative to the radiance there. Radiance over the squared index
+    /// of refraction is constant along a ray \[Veach 1998, 5.2\], and a camera is not in the solids hidden from it.
+    #[cold]
+    pub fn seen_radiance(&self, scene: &Scene) -> f32 {
+        let mut host = None;
+        let mut see = |entry: u32| {
+            let seen = entry & ABSENT == 0 && !scene.shapes.instances[entry as usize].hidden_from_camera;
+            if seen && host.is_none_or(|host| strength(scene, entry) > strength(scene, host)) {
+                host = Some(entry);
+            }
+        };
+        self.entries().iter().copied().for_each(&mut see);
+        self.for_each_outer(scene, see);
+        let seen = ior(scene, host.map(|instance| scene.shapes.instances[instance as usize].material));
+        (seen / self.ior(scene)).powi(2)
+    }
+
     /// The medium that fills the space around the path; `None` without one.
     #[inline]
     pub fn medium(&self, scene: &Scene) -> Option<MediumParameters> {

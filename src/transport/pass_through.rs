@@ -49,6 +49,7 @@ pub(super) fn for_each_pass_through_light(
                 reaching: None,
                 in_medium: [from_medium, false],
                 destination: Destination::Any,
+                to_lens: false,
             };
             let visibility = shadow_ray(scene, &between);
             if visibility.transmittance != Rgb::ZERO {
@@ -90,6 +91,7 @@ pub(super) fn for_each_bulb(
             reaching: None,
             in_medium: [from_medium, false],
             destination: Destination::Any,
+            to_lens: false,
         };
         let light = radiance * shadow_ray(scene, &between).transmittance;
         if light != Rgb::ZERO {

@@ -120,7 +120,8 @@ pub trait ScatterPoint {
         }
         let interior = *self.interiors()[usize::from(self.crosses(wi))];
         let start = Start { origin, direction, interior, leaving, token };
-        shadow_ray(scene, &ShadowRay { start, tmax, reaching, in_medium: [Self::IN_MEDIUM, to_medium], destination })
+        let in_medium = [Self::IN_MEDIUM, to_medium];
+        shadow_ray(scene, &ShadowRay { start, tmax, reaching, in_medium, destination, to_lens: true })
     }
 }
 

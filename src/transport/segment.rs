@@ -191,8 +191,16 @@ enum Boundary {
     Scattering(f32, Option<Crossing>),
 }
 
+/// What the surface does to a ray along `direction`. `to_lens`: a camera ray is traced backwards, towards the lens.
 #[inline(always)]
-fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Vec3, token: u32) -> Boundary {
+fn boundary(
+    scene: &Scene,
+    surface: &Surface,
+    interior: &Interior,
+    direction: Vec3,
+    token: u32,
+    to_lens: bool,
+) -> Boundary {
     let material = &scene.materials.list[surface.material as usize];
     if !material.is_solid() {
         // The coat of an opaque body borders on the medium around the body, such as air or water.
@@ -207,6 +215,12 @@ fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Ve
         return Boundary::None(Rgb::ONE, behind);
     }
     let crossing = interior.crossing(scene, surface.instance, entering);
+    if passes_hidden_solids(scene, token) && scene.shapes.instances[surface.instance as usize].hidden_from_camera {
+        let (before, after) = (ior(scene, crossing.before), ior(scene, crossing.after));
+        // Radiance over the squared index of refraction stays constant, as if the ray were refracted.
+        let ratio = if to_lens { after / before } else { before / after };
+        return Boundary::None(Rgb::splat(ratio * ratio), crossing.interior);
+    }
     // A surface that emits light is never skipped.
     if crossing.is_nothing() && !material.emits() {
         return Boundary::None(Rgb::ONE, crossing.interior);
@@ -243,6 +257,19 @@ pub(super) fn camera_token(scene: &Scene, draws: Draws, purpose: Purpose) -> u32
 pub(super) fn with_camera_bit(scene: &Scene, bits: u32, camera: bool) -> u32 {
     let matters = scene.survey.hidden_from_camera || scene.survey.culled;
     if matters { bits & !CAMERA_RAY_BIT | if camera { CAMERA_RAY_BIT } else { 0 } } else { bits }
+}
+
+/// Whether the ray of a token is a camera ray in a scene with solids that are hidden from cameras. Such a ray crosses
+/// the boundaries of hidden solids straight, and meets no medium where a hidden solid fills the space.
+#[inline(always)]
+fn passes_hidden_solids(scene: &Scene, token: u32) -> bool {
+    scene.survey.hidden_solids && token & CAMERA_RAY_BIT != 0
+}
+
+/// The medium that affects a ray inside these solids; `None` without one.
+#[inline(always)]
+fn medium(scene: &Scene, interior: &Interior, token: u32) -> Option<MediumParameters> {
+    if passes_hidden_solids(scene, token) && interior.is_hidden(scene) { None } else { interior.medium(scene) }
 }
 
 /// Start of a ray between two path vertices.
@@ -283,7 +310,7 @@ pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start, known: &Preco
         };
         let met = along.next_traced(scene, traced, !interior.is_open());
         let (origin, before, left) = (along.ray().origin, distance, transmittance);
-        let medium = if T::MEDIA && scene.survey.media { interior.medium(scene) } else { None };
+        let medium = if T::MEDIA && scene.survey.media { medium(scene, &interior, token) } else { None };
         let Some((mut surface, t)) = met else {
             if let Some(medium) = medium {
                 let (distance, beyond) = (f32::INFINITY, None);
@@ -313,7 +340,7 @@ pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start, known: &Preco
             };
             surface = other;
         }
-        match boundary(scene, &surface, &interior, direction, token) {
+        match boundary(scene, &surface, &interior, direction, token, false) {
             Boundary::Scattering(eta, crossing) => {
                 return End::Surface(Arrival { surface, eta, crossing, interior, transmittance, distance });
             }
@@ -354,7 +381,7 @@ impl Visibility {
     #[inline(never)]
     fn through(self, scene: &Scene, part: RayPart<'_>, starts: bool, ends: bool) -> Visibility {
         let RayPart { interior, origin, direction, distance, random } = part;
-        let Some(medium) = interior.medium(scene) else { return self };
+        let Some(medium) = medium(scene, interior, random.0) else { return self };
         if let Some(ray) = interior.grid_ray(scene, origin, direction) {
             let transmittance = self.transmittance * attenuation(&ray, &medium, distance, random);
             let flight = ray.flight_density(self.flight, &medium, distance, starts, ends);
@@ -414,6 +441,8 @@ pub struct ShadowRay {
     pub in_medium: [bool; 2],
     /// The solids in which the shadow ray must arrive.
     pub destination: Destination,
+    /// Whether the ray ends at the lens, if its token is that of a camera ray; otherwise such a ray starts there.
+    pub to_lens: bool,
 }
 
 /// Transmittance along a shadow ray (zero if a scattering surface blocks it, otherwise that of media and tinted
@@ -423,7 +452,12 @@ pub fn shadow_ray(scene: &Scene, between: &ShadowRay) -> Visibility {
     let ShadowRay { start: Start { origin, direction, ref interior, leaving, token }, tmax, reaching, .. } = *between;
     let [starts, ends] = between.in_medium;
     let culls = scene.survey.culled && token & CAMERA_RAY_BIT != 0;
-    if scene.survey.null_boundaries || culls || leaving.is_some() || reaching.is_some() {
+    if scene.survey.null_boundaries
+        || culls
+        || passes_hidden_solids(scene, token)
+        || leaving.is_some()
+        || reaching.is_some()
+    {
         return trace_through_boundaries(scene, between);
     }
     if !between.destination.admits(scene, interior) || scene.tracer.occluded(&Ray { origin, direction, tmax, token }) {
@@ -437,6 +471,7 @@ pub fn shadow_ray(scene: &Scene, between: &ShadowRay) -> Visibility {
 /// Traces a [`shadow_ray`] through boundaries that do not scatter.
 fn trace_through_boundaries(scene: &Scene, between: &ShadowRay) -> Visibility {
     let ShadowRay { start: Start { origin, direction, mut interior, leaving, token }, tmax, reaching, .. } = *between;
+    let to_lens = between.to_lens;
     let mut along = RaySurfaces::new(Ray { origin, direction, tmax, token }, leaving);
     let mut visibility = Visibility::CLEAR;
     let [mut starts, ends] = between.in_medium;
@@ -446,9 +481,12 @@ fn trace_through_boundaries(scene: &Scene, between: &ShadowRay) -> Visibility {
             let distance = along.ray().tmax.max(0.0);
             let part = RayPart { interior: &interior, origin: before, direction, distance, random };
             visibility.pass(scene, part, starts, ends);
+            if to_lens && passes_hidden_solids(scene, token) {
+                visibility.transmittance *= interior.seen_radiance(scene);
+            }
             let touching = reaching.map(|place| contact::surfaces_before(scene, &place, direction, token));
             for surface in touching.iter().flatten() {
-                match boundary(scene, surface, &interior, direction, token) {
+                match boundary(scene, surface, &interior, direction, token, to_lens) {
                     Boundary::Scattering(..) => return Visibility::BLOCKED,
                     Boundary::None(tint, behind) => {
                         (visibility.transmittance, interior) = (visibility.transmittance * tint, behind)
@@ -462,15 +500,15 @@ fn trace_through_boundaries(scene: &Scene, between: &ShadowRay) -> Visibility {
             visibility.pass(scene, part, starts, false);
             starts = false;
         }
-        // Reversed, because culling refers to rays from the lens.
-        if token & CAMERA_RAY_BIT != 0 && scene.culls(&surface, -direction) {
-            let Some(other) = contact::visible_on_culled(scene, &surface, -direction, token) else {
+        let from_lens = if to_lens { -direction } else { direction };
+        if token & CAMERA_RAY_BIT != 0 && scene.culls(&surface, from_lens) {
+            let Some(other) = contact::visible_on_culled(scene, &surface, from_lens, token) else {
                 along.pass(&surface);
                 continue;
             };
             surface = other;
         }
-        match boundary(scene, &surface, &interior, direction, token) {
+        match boundary(scene, &surface, &interior, direction, token, to_lens) {
             Boundary::Scattering(..) => return Visibility::BLOCKED,
             Boundary::None(tint, behind) => {
                 visibility.transmittance *= tint;

@@ -132,6 +132,9 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
     while path.depth <= max_depth {
         let (end, flight) = path.travel::<V, BESIDES>(known, visitor);
         known = &PrecomputedHit::Unknown;
+        if scene.survey.hidden_solids && path.depth == 1 && transport == Transport::Radiance {
+            path.enter_hidden_solids(&end);
+        }
         let goes_on = match end {
             End::Surface(arrival) => path.surface::<V, BESIDES>(arrival, flight, visitor),
             End::Medium(met) => path.medium(met, flight, visitor),
@@ -242,6 +245,18 @@ impl<'a> Path<'a> {
             scattered.pdf_w *= flight.forward;
         }
         (end, flight)
+    }
+
+    /// Keeps roulette from treating the lower throughput of a camera ray that ends in a hidden solid as absorption, as
+    /// where a ray is refracted.
+    #[cold]
+    fn enter_hidden_solids(&mut self, end: &End) {
+        let there = match end {
+            End::Surface(arrival) => &arrival.interior,
+            End::Medium(arrival) => &arrival.interior,
+            End::Escaped(_) | End::Lost => return,
+        };
+        self.survival_scale *= (there.ior(self.scene) / self.interior.ior(self.scene)).powi(2);
     }
 
     /// Scatters the path in a medium; `None` ends it.

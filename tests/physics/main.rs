@@ -17,6 +17,7 @@ mod filters;
 mod furnaces;
 mod glints;
 mod guide;
+mod hidden;
 mod lamps;
 mod large_triangles;
 mod light_groups;
