@@ -6,7 +6,7 @@ use super::picture::{
 use super::random::Random;
 use super::relation::similar;
 use super::shapes::{cuboid, disc, joined, prism, quad, sphere, triangle};
-use super::world::{Lens, Light, LightKind, Matter, Medium, Mesh, Placement, ThingKind, World};
+use super::world::{Later, Lens, Light, LightKind, Matter, Medium, Mesh, Placement, ThingKind, World};
 use caustique::render::Method;
 use glam::{DAffine3, DQuat, DVec3};
 use std::f64::consts::PI;
@@ -26,9 +26,22 @@ pub enum Form {
     Pane,
     /// White objects of all kinds under a white sky.
     Furnace,
+    /// A wall seen through blocks that absorb and overlap, some of them hidden, which may appear after the frame.
+    Overlap,
+    /// White objects, and the camera, in white solids that are hidden from the camera.
+    Hidden,
 }
 
-pub const FORMS: [Form; 6] = [Form::Glowing, Form::Punctual, Form::Bounce, Form::Absorbing, Form::Pane, Form::Furnace];
+pub const FORMS: [Form; 8] = [
+    Form::Glowing,
+    Form::Punctual,
+    Form::Bounce,
+    Form::Absorbing,
+    Form::Pane,
+    Form::Furnace,
+    Form::Overlap,
+    Form::Hidden,
+];
 
 /// A scene and its known picture.
 pub struct Known {
@@ -49,6 +62,8 @@ impl Form {
             Form::Absorbing => absorbing(&mut random),
             Form::Pane => pane(&mut random),
             Form::Furnace => furnace(&mut random),
+            Form::Overlap => overlap(&mut random),
+            Form::Hidden => hidden(&mut random),
         };
         let rotation = if random.chance(0.5) { DQuat::IDENTITY } else { random.turn() };
         let size = random.scale(1e-3, 1e3);
@@ -65,8 +80,8 @@ impl Form {
         match self {
             Form::Glowing | Form::Punctual => all,
             Form::Bounce => vec![M::Path, M::Bdpt, M::Vcm, M::Sppm, M::Light],
-            Form::Absorbing | Form::Pane => vec![M::Path, M::Bdpt, M::Vcm, M::Sppm],
-            Form::Furnace => vec![M::Path, M::Bdpt, M::Vcm, M::Sppm],
+            Form::Absorbing | Form::Pane | Form::Overlap => vec![M::Path, M::Bdpt, M::Vcm, M::Sppm],
+            Form::Furnace | Form::Hidden => vec![M::Path, M::Bdpt, M::Vcm, M::Sppm],
         }
     }
 
@@ -359,6 +374,90 @@ fn pane(random: &mut Random) -> Known {
     let through = (1.0 - reflected).powi(2) * left / (DVec3::ONE - reflected * reflected * left * left);
     let expected = expect(&world, |_, _| emission * through);
     Known { world, expected, max_depth: u32::MAX }
+}
+
+/// A block that absorbs: the inverse of its placement, its half sides and coefficient, and what decides which block fills
+/// the space: priority and volume. Hidden blocks absorb nothing where they do.
+struct Block {
+    back: DAffine3,
+    half: DVec3,
+    sigma_a: DVec3,
+    priority: i32,
+    hidden: bool,
+}
+
+impl Block {
+    /// The distances at which a ray enters and leaves the block.
+    fn chord(&self, origin: DVec3, direction: DVec3) -> Option<[f64; 2]> {
+        let (o, d) = (self.back.transform_point3(origin), self.back.transform_vector3(direction));
+        let (t0, t1) = ((-self.half - o) / d, (self.half - o) / d);
+        let (enter, leave) = (t0.min(t1).max_element().max(0.0), t0.max(t1).min_element());
+        (enter < leave).then_some([enter, leave])
+    }
+}
+
+fn overlap(random: &mut Random) -> Known {
+    let view = random.within(0.2, 0.7);
+    let (mut world, emission) = before_a_wall(random, view);
+    let mut blocks = vec![];
+    for _ in 0..2 + random.below(4) {
+        let around_camera = random.chance(0.15);
+        let half = if around_camera { random.vector(0.2, 0.3) } else { random.vector(0.1, 0.45) };
+        let middle = if around_camera { DVec3::Z * 2.0 } else { DVec3::ZERO };
+        let translation = middle + random.vector(-0.1, 0.1);
+        let chain = vec![Placement { translation, rotation: random.turn(), scale: DVec3::ONE }];
+        let (sigma_a, priority, hidden) = (random.vector(0.2, 4.0), random.below(2) as i32, random.chance(0.3));
+        let medium = Some(Medium { sigma_a, sigma_s: DVec3::ZERO, g: 0.0 });
+        let matter = Matter { medium, priority, ..Matter::glass(1.0, 0.0) };
+        let thing = world.add("block", cuboid(-half, half, false), matter, chain);
+        thing.hidden = hidden;
+        blocks.push(Block { back: thing.to_world().inverse(), half, sigma_a, priority, hidden });
+    }
+    let expected = expect(&world, |origin, direction| {
+        let chords: Vec<_> = blocks.iter().filter_map(|block| Some((block, block.chord(origin, direction)?))).collect();
+        let mut ends: Vec<f64> = chords.iter().flat_map(|(_, chord)| *chord).collect();
+        ends.sort_by(f64::total_cmp);
+        let depth: DVec3 = ends
+            .windows(2)
+            .map(|part| {
+                let middle = 0.5 * (part[0] + part[1]);
+                let here = chords.iter().filter(|(_, [enter, leave])| (*enter..*leave).contains(&middle));
+                let volume = |block: &Block| block.half.element_product();
+                let fills = here
+                    .map(|(block, _)| block)
+                    .max_by(|a, b| a.priority.cmp(&b.priority).then(volume(b).total_cmp(&volume(a))));
+                fills.filter(|block| !block.hidden).map_or(DVec3::ZERO, |block| block.sigma_a * (part[1] - part[0]))
+            })
+            .sum();
+        emission * (-depth).exp()
+    });
+    if random.chance(0.6) {
+        let shutter = [[0.75, 0.75], [0.5, 0.75]][random.below(2)];
+        world.later = Some(Later { seed: random.below(1 << 20) as u64, shutter });
+    }
+    Known { world, expected, max_depth: u32::MAX }
+}
+
+fn hidden(random: &mut Random) -> Known {
+    let Known { mut world, expected, max_depth } = furnace(random);
+    let places: Vec<DVec3> = world.things.iter().map(|thing| thing.to_world().translation).collect();
+    for (index, p) in places.into_iter().enumerate() {
+        // The first one is the camera.
+        if index > 0 && random.chance(0.2) || index == 0 && random.chance(0.5) {
+            continue;
+        }
+        let scatters = Medium { sigma_a: DVec3::ZERO, sigma_s: random.vector(0.5, 3.0), g: random.within(-0.5, 0.5) };
+        let ior = if random.chance(0.2) { 1.0 } else { random.within(1.1, 1.6) };
+        let medium = random.chance(0.5).then_some(scatters);
+        let matter = Matter { medium, priority: -1, ..Matter::glass(ior, 0.0) };
+        let (mesh, half) = match random.below(2) {
+            0 => (sphere(16, false), 0.45),
+            _ => (cuboid(DVec3::splat(-1.0), DVec3::ONE, false), 0.38),
+        };
+        let chain = vec![Placement { translation: p, rotation: random.turn(), scale: DVec3::splat(half) }];
+        world.add("around", mesh, matter, chain).hidden = true;
+    }
+    Known { world, expected, max_depth }
 }
 
 fn furnace(random: &mut Random) -> Known {

@@ -6,7 +6,7 @@
 use super::random::Random;
 use super::relation::similar;
 use super::shapes::{cuboid, disc, joined, lathe, prism, quad, sphere, triangle, vessel};
-use super::world::{Lens, Light, LightKind, Matter, Medium, Mesh, Placement, Texture, ThingKind, World};
+use super::world::{Lens, Light, LightKind, Matter, Medium, Mesh, Placement, Texture, Thing, ThingKind, World};
 use glam::{DQuat, DVec3, EulerRot};
 use std::f64::consts::{PI, TAU};
 
@@ -42,6 +42,10 @@ pub fn generate(seed: u64) -> World {
     generator.things();
     if seed >= FIRST_WITH_ADDITIONS {
         generator.additions(seed);
+        // Drawn by numbers of their own, so that the rest of a seed's scene stays.
+        let own = std::mem::replace(&mut generator.random, Random::new(seed ^ 0x5ca1e));
+        generator.rare();
+        generator.random = own;
     }
     generator.placed()
 }
@@ -432,6 +436,56 @@ impl Generator {
             let matter = Matter { priority, ..Matter::glass(if self.random.chance(0.5) { 1.0 } else { 1.4 }, 0.0) };
             self.world.add("displacing", sphere(12, true), matter, vec![place]);
         }
+    }
+
+    /// Adds what few scenes have: priorities, solids that overlap, and things that are hidden from the camera, among
+    /// them solids around the camera and around what it sees.
+    fn rare(&mut self) {
+        if self.random.chance(0.3) {
+            for matter in self.world.materials.iter_mut().filter(|matter| matter.is_glass() && matter.priority == 0) {
+                matter.priority = self.random.below(3) as i32;
+            }
+        }
+        if self.random.chance(0.3) {
+            self.overlapping();
+        }
+        if self.random.chance(0.2) {
+            let walls = ["wall", "ground"];
+            for thing in self.world.things.iter_mut().filter(|thing| !walls.iter().any(|w| thing.name.starts_with(w))) {
+                thing.hidden = thing.mesh().is_some() && self.random.chance(0.3);
+            }
+        }
+        let mut places = vec![];
+        if self.random.chance(0.15) {
+            let cameras = self.world.things.iter().filter(|thing| thing.is_camera());
+            places.extend(cameras.map(|camera| (camera.to_world().translation, 0.9 * CAMERA_SPACE)));
+        }
+        if self.random.chance(0.15) {
+            let things = self.world.things.iter().filter(|thing| thing.name.starts_with("floating"));
+            let near = |thing: &Thing| (thing.to_world().translation, 1.2 * self.world.radius(thing));
+            places.extend(things.take(1).map(near));
+        }
+        for (translation, radius) in places {
+            let place = Placement { translation, rotation: self.random.turn(), scale: DVec3::splat(radius) };
+            let matter = Matter { priority: -2, ..self.transparent() };
+            let mesh = sphere(16, false);
+            self.world.add("around", mesh, matter, vec![place]).hidden = true;
+        }
+    }
+
+    /// Adds a solid that overlaps a floating one.
+    fn overlapping(&mut self) {
+        let world = &self.world;
+        let solid = |thing: &&Thing| {
+            thing.name.starts_with("floating") && world.matter(thing).is_some_and(|matter| matter.is_glass())
+        };
+        let Some(thing) = world.things.iter().find(solid) else { return };
+        let (p, radius) = (thing.to_world().translation, world.radius(thing));
+        let translation = p + self.random.vector(-0.3, 0.3) * radius;
+        let place = Placement { translation, rotation: self.random.turn(), scale: DVec3::splat(0.6 * radius) };
+        let matter = Matter { priority: self.random.below(2) as i32, ..self.transparent() };
+        let mesh = cuboid(DVec3::splat(-0.57), DVec3::splat(0.57), false);
+        self.world.add("overlapping", mesh, matter, vec![place]);
     }
 
     /// Scales, rotates and moves the whole scene.

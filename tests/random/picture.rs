@@ -4,14 +4,17 @@ use super::usd;
 use super::world::World;
 use super::write::glb;
 use crate::support::stats::mean_and_error;
+use caustique::camera::Camera;
 use caustique::material::{Material, MediumGrids};
 use caustique::math::Vec3;
 use caustique::medium::{DensityGrid, EmissionGrid, Grid};
 use caustique::plan::switch::Removed;
 use caustique::plan::{Effect, EffectPlan, Plan, PlanRequest, Switches};
-use caustique::render::{Control, Levels, Method, Rendered, Settings, render};
-use caustique::scene::gltf::{self, ReadOptions};
-use caustique::scene::{CameraRequest, Crop, Description, Scene};
+use caustique::render::{
+    Control, Levels, Method, Motion, RenderInput, Rendered, Session, Settings, render, run_session,
+};
+use caustique::scene::gltf::{self, FrameTime, Moments, MovingFile, ReadOptions};
+use caustique::scene::{CameraRequest, Crop, Description, MomentBuilder, Scene, light_preset};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::path::Path;
 use std::sync::Arc;
@@ -132,15 +135,64 @@ pub type Set = Vec<Vec<f64>>;
 /// # Errors
 /// The renderer refuses the scene, or rejects samples.
 pub fn renders(world: &World, shot: &Shot, seeds: std::ops::Range<u64>) -> Result<Vec<Rendered>, String> {
+    if world.later.is_some() {
+        return later(world, shot, seeds);
+    }
     let scene = if shot.usd { build(usd::read(world)?)? } else { read(world)? };
     let camera = scene.camera(&shot.view()).map_err(|error| error.to_string())?;
+    seeds.map(|seed| accepted(render(&scene, &camera, &shot.settings(seed), |_, _| Control::Continue))).collect()
+}
+
+/// The render, or an error if samples are rejected.
+fn accepted(rendered: Rendered) -> Result<Rendered, String> {
+    match rendered.rejected() {
+        0 => Ok(rendered),
+        rejected => Err(format!("{rejected} samples are not finite")),
+    }
+}
+
+/// The moments of a scene while its shutter is open.
+struct Moving<'a> {
+    moments: Moments<'a>,
+    builder: MomentBuilder<'a>,
+    shutter: [f64; 2],
+    view: CameraRequest,
+}
+
+impl Motion for Moving<'_> {
+    fn at(&self, time: f64) -> caustique::error::Result<(Scene, Camera)> {
+        let [open, close] = self.shutter;
+        let scene = self.builder.build(self.moments.describe(open + (close - open) * time, self.builder.meshes())?)?;
+        let camera = scene.camera(&self.view)?;
+        Ok((scene, camera))
+    }
+}
+
+/// Renders a scene that appears after the frame, as the command line does: with the studio if it seems to have no light.
+fn later(world: &World, shot: &Shot, seeds: std::ops::Range<u64>) -> Result<Vec<Rendered>, String> {
+    let text = |error: caustique::error::Error| error.to_string();
+    let frame = Some(FrameTime { number: 0, rate: Some(1.0), of_sequence: false });
+    let options = ReadOptions { frame, shutter: world.later.map(|later| later.shutter), ..ReadOptions::default() };
+    let read = MovingFile::from_bytes(glb(world).into(), Path::new("random.glb"), &options);
+    let (mut description, file) = read.map_err(text)?;
+    light_preset::apply(&mut description, None);
+    let scene = build(description)?;
+    let camera = scene.camera(&shot.view()).map_err(text)?;
+    let moving = match (&file, scene.shutter) {
+        (Some(file), Some(shutter)) => {
+            let (moments, builder) = (file.moments().map_err(text)?, MomentBuilder::new(&scene));
+            Some(Moving { moments, builder, shutter, view: shot.view() })
+        }
+        _ => None,
+    };
     seeds
         .map(|seed| {
-            let rendered = render(&scene, &camera, &shot.settings(seed), |_, _| Control::Continue);
-            match rendered.rejected() {
-                0 => Ok(rendered),
-                rejected => Err(format!("{rejected} samples are not finite")),
-            }
+            let settings = shot.settings(seed);
+            let motion = moving.as_ref().map(|moving| moving as &dyn Motion);
+            let input = RenderInput::new(&scene, &camera, &settings).with_motion(motion);
+            let mut session = Session::new(&input);
+            let stop = run_session(&mut session, |_, _| Control::Continue);
+            accepted(session.finish(stop))
         })
         .collect()
 }

@@ -2,7 +2,7 @@
 
 use super::forms::{Form, Known};
 use super::relation::{Other, Relation, lifted, switch_off};
-use super::world::{Mesh, Thing, ThingKind, World};
+use super::world::{Medium, Mesh, Thing, ThingKind, World};
 use glam::DVec3;
 
 /// A planted bug in one of the two sides of a relation.
@@ -111,6 +111,22 @@ fn turn_lights_off(world: &mut World, other: &mut Other) -> bool {
     first.map(|first| switch_off(&mut other.worlds[0], first)).is_some()
 }
 
+/// Solids that are added around the camera absorb, and cameras see them.
+fn fill_voids(_: &mut World, other: &mut Other) -> bool {
+    let medium =
+        Some(Medium { sigma_a: DVec3::splat(10.0), sigma_s: DVec3::ZERO, g: 0.0 }.scaled(other.worlds[0].size));
+    let world = &mut other.worlds[0];
+    let voids = world.things.iter_mut().filter(|thing| thing.hidden);
+    let mut any = false;
+    for thing in voids.filter(|thing| thing.name.starts_with("void")) {
+        thing.hidden = false;
+        let Some((_, material)) = thing.mesh() else { continue };
+        world.materials[material].medium = medium;
+        any = true;
+    }
+    any
+}
+
 /// Every relation with a fault that breaks it.
 pub fn plants() -> Vec<Plant> {
     let plant = |name, relation, seed, spoil| Plant { name, relation, seed, spoil };
@@ -129,6 +145,8 @@ pub fn plants() -> Vec<Plant> {
         plant("light does not double", Relation::Doubled, 0, double_less),
         plant("channels stay", Relation::Permuted, 0, forget_channels),
         plant("glass is glued to the floor", Relation::Lifted, 79, glue),
+        plant("the frame is shown", Relation::Later, 0, turn_lights_off),
+        plant("solids around the camera are seen", Relation::Void, 0, fill_voids),
         plant("the window shows more", Relation::Cropped, 0, widen),
         plant("lamps are a tenth too bright", Relation::Usd, 0, brighten),
         plant("a mirror is forgotten", Relation::MirroredTwice, 0, forget_a_mirror),
@@ -139,12 +157,12 @@ pub fn plants() -> Vec<Plant> {
 pub fn spoil(form: Form, known: &mut Known) {
     match form {
         Form::Glowing | Form::Punctual | Form::Bounce => known.world = lights_hide_themselves(&known.world),
-        Form::Absorbing | Form::Pane => {
+        Form::Absorbing | Form::Pane | Form::Overlap => {
             for medium in known.world.materials.iter_mut().filter_map(|matter| matter.medium.as_mut()) {
                 medium.sigma_a *= 0.7;
             }
         }
-        Form::Furnace => {
+        Form::Furnace | Form::Hidden => {
             for matter in &mut known.world.materials {
                 matter.base = DVec3::splat(0.7);
             }

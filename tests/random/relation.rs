@@ -3,7 +3,7 @@
 use super::picture::{Difference, Found, MEANS, SIGNIFICANCE, Set, Shot, TOLERANCE, confirmed, differences, pictures};
 use super::random::Random;
 use super::shapes::cuboid;
-use super::world::{Light, LightKind, Matter, Mesh, Placement, ThingKind, World};
+use super::world::{Later, Light, LightKind, Matter, Mesh, Placement, ThingKind, World};
 use caustique::render::Method;
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
@@ -39,6 +39,10 @@ pub enum Relation {
     MirroredTwice,
     /// A small black object is added far away.
     FarThing,
+    /// The scene appears after its frame, and the shutter is open then, for no time or for some.
+    Later,
+    /// Hidden solids without any content are added, around the camera and around a thing.
+    Void,
     /// The scene is read as a USD stage, reduced to what USD can express ([`super::usd::reduced`]).
     Usd,
     /// Another method renders the scene.
@@ -46,7 +50,7 @@ pub enum Relation {
 }
 
 /// Relations between pictures of one method.
-pub const RELATIONS: [Relation; 14] = [
+pub const RELATIONS: [Relation; 16] = [
     Relation::Moved,
     Relation::Turned,
     Relation::Scaled,
@@ -61,6 +65,8 @@ pub const RELATIONS: [Relation; 14] = [
     Relation::Cropped,
     Relation::MirroredTwice,
     Relation::FarThing,
+    Relation::Later,
+    Relation::Void,
 ];
 
 /// The counterpart of a scene in a relation.
@@ -110,6 +116,15 @@ impl Relation {
             }
             Relation::MirroredTwice => one(mirrored(world)),
             Relation::FarThing => one(with_far_thing(world)?),
+            Relation::Later => {
+                // The grids of fires are no part of the file, which is read again at each moment.
+                if world.materials.iter().any(|matter| matter.fire.is_some()) {
+                    return None;
+                }
+                let shutter = [[0.75, 0.75], [0.5, 0.75], [0.4, 1.0]][random.below(3)];
+                one(World { later: Some(Later { seed: world.seed, shutter }), ..world.clone() })
+            }
+            Relation::Void => one(with_voids(world)?),
             Relation::Usd => Other { shot: Shot { usd: true, ..shot.clone() }, ..one(world.clone()) },
             Relation::Method(method) => Other {
                 shot: Shot { method, ..shot.clone() },
@@ -458,5 +473,26 @@ fn with_far_thing(world: &World) -> Option<World> {
     let place = Placement { translation: DVec3::new(20.0, 17.0, -25.0) * world.size, ..Placement::IDENTITY };
     let place = Placement { scale: DVec3::splat(world.size), ..place };
     made.add("far", mesh, Matter::matte(DVec3::ZERO), vec![place]);
+    Some(made)
+}
+
+/// Adds solids without any content: hidden ones around the cameras and around the largest thing that glows or stands
+/// free. `None` in fog, which they would displace.
+fn with_voids(world: &World) -> Option<World> {
+    if world.fog.is_some() {
+        return None;
+    }
+    let mut made = world.clone();
+    let matter = Matter { specular: 0.0, priority: -9, ..Matter::glass(1.0, 0.0) };
+    let cube = cuboid(DVec3::splat(-1.0), DVec3::ONE, false);
+    let size = |thing: &&super::world::Thing| world.radius(thing);
+    let free = world.things.iter().filter(|thing| thing.name.starts_with("floating"));
+    let around = free.max_by(|a, b| size(a).total_cmp(&size(b))).map(|thing| (thing, 1.3 * world.radius(thing)));
+    let cameras = world.things.iter().filter(|thing| thing.is_camera()).map(|thing| (thing, 0.04 * world.size));
+    for (thing, half) in cameras.chain(around) {
+        let translation = thing.to_world().translation;
+        let place = Placement { translation, rotation: DQuat::from_rotation_y(0.3), scale: DVec3::splat(half) };
+        made.add("void", cube.clone(), matter.clone(), vec![place]).hidden = true;
+    }
     Some(made)
 }

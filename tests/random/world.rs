@@ -22,6 +22,24 @@ pub struct World {
     pub sky: Option<DVec3>,
     /// The medium that fills the scene.
     pub fog: Option<Medium>,
+    /// Whether the scene appears after the frame.
+    #[serde(default)]
+    pub later: Option<Later>,
+}
+
+/// A scene that appears after its frame 0: lights are dark at the frame and things have other sizes. Frames last a
+/// second.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Later {
+    /// Seed of the sizes at the frame.
+    pub seed: u64,
+    /// Times at which the shutter opens and closes (seconds), after [`Later::START`].
+    pub shutter: [f64; 2],
+}
+
+impl Later {
+    /// Time from which the scene is there (seconds).
+    pub const START: f64 = 0.25;
 }
 
 /// An object, light or camera with its placement.
@@ -37,6 +55,9 @@ pub struct Thing {
     pub body: u32,
     /// Whether the body stands on something opaque.
     pub rests: bool,
+    /// Whether cameras do not see the thing.
+    #[serde(default)]
+    pub hidden: bool,
 }
 
 /// Kind of a thing.
@@ -274,7 +295,7 @@ impl World {
     pub fn add_kind(&mut self, name: &str, kind: ThingKind, chain: Vec<Placement>) -> &mut Thing {
         let index = self.things.len();
         let body = self.things.iter().map(|thing| thing.body + 1).max().unwrap_or(0);
-        self.things.push(Thing { name: format!("{name} {index}"), chain, kind, body, rests: false });
+        self.things.push(Thing { name: format!("{name} {index}"), chain, kind, body, rests: false, hidden: false });
         &mut self.things[index]
     }
 

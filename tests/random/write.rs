@@ -1,6 +1,7 @@
 //! Writes scenes as the bytes of a .glb file.
 
-use super::world::{Lens, Light, LightKind, Matter, Medium, Mesh, Texture, Thing, ThingKind, World};
+use super::random::Random;
+use super::world::{Later, Lens, Light, LightKind, Matter, Medium, Mesh, Texture, Thing, ThingKind, World};
 use glam::DVec3;
 use image::{ImageFormat, RgbImage};
 use serde_json::{Value, json};
@@ -17,12 +18,24 @@ struct Writer {
     cameras: Vec<Value>,
     /// Meshes by mesh and material index.
     meshes: Vec<((usize, usize), Value)>,
+    /// Channels of the animation and their samplers.
+    channels: Vec<Value>,
+    samplers: Vec<Value>,
 }
 
 /// The scene as a .glb file.
 pub fn glb(world: &World) -> Vec<u8> {
     let mut writer = Writer::default();
-    let roots: Vec<usize> = world.things.iter().map(|thing| writer.thing(world, thing)).collect();
+    let mut sizes = world.later.map(|later| Random::new(later.seed));
+    let roots: Vec<usize> = world
+        .things
+        .iter()
+        .map(|thing| writer.thing(world, thing, sizes.as_mut().map(|sizes| sizes.scale(0.3, 3.0))))
+        .collect();
+    for (index, matter) in world.materials.iter().enumerate().filter(|(_, matter)| matter.glows() && sizes.is_some()) {
+        let pointer = pointer(&format!("/materials/{index}/emissiveFactor"));
+        writer.appears(pointer, DVec3::ZERO, matter.emission / matter.emission.max_element());
+    }
     let images: Vec<Value> = world.textures.iter().map(|texture| writer.image(texture)).collect();
     let textures: Vec<Value> = (0..images.len()).map(|i| json!({"source": i, "sampler": 0})).collect();
     let materials: Vec<Value> = world.materials.iter().map(material).collect();
@@ -37,7 +50,7 @@ pub fn glb(world: &World) -> Vec<u8> {
         "asset": {"version": "2.0", "generator": "random scenes of caustique"},
         "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_transmission", "KHR_materials_volume",
             "KHR_materials_ior", "KHR_materials_specular", "KHR_materials_emissive_strength",
-            "KHR_materials_clearcoat"],
+            "KHR_materials_clearcoat", "KHR_animation_pointer"],
         "scene": 0,
         "scenes": [{"nodes": roots, "extras": {"caustique": extras}}],
         "nodes": writer.nodes,
@@ -60,6 +73,9 @@ pub fn glb(world: &World) -> Vec<u8> {
             document[key] = list.into();
         }
     }
+    if !writer.channels.is_empty() {
+        document["animations"] = json!([{"channels": writer.channels, "samplers": writer.samplers}]);
+    }
     if !writer.lights.is_empty() {
         document["extensions"] = json!({"KHR_lights_punctual": {"lights": writer.lights}});
     }
@@ -67,12 +83,24 @@ pub fn glb(world: &World) -> Vec<u8> {
 }
 
 impl Writer {
-    /// Writes the chain of nodes of a thing, and returns the index of the first node.
-    fn thing(&mut self, world: &World, thing: &Thing) -> usize {
+    /// Writes the chain of nodes of a thing, and returns the index of the first node. `size` is the relative size at the
+    /// frame of a thing that appears later.
+    fn thing(&mut self, world: &World, thing: &Thing, size: Option<f64>) -> usize {
         let mut node = json!({"name": thing.name});
+        if thing.hidden {
+            node["extras"] = json!({"caustique": {"visible": {"camera": false}}});
+        }
         match &thing.kind {
             ThingKind::Mesh { mesh, material } => node["mesh"] = self.mesh(world, *mesh, *material).into(),
-            ThingKind::Light(light) => self.light(light, &mut node),
+            ThingKind::Light(light) => {
+                self.light(light, &mut node);
+                if size.is_some() {
+                    let index = self.lights.len() - 1;
+                    let intensity = self.lights[index]["intensity"].as_f64().expect("a number");
+                    let pointer = pointer(&format!("/extensions/KHR_lights_punctual/lights/{index}/intensity"));
+                    self.appears_number(pointer, 0.0, intensity);
+                }
+            }
             ThingKind::Camera(lens) => self.camera(lens, &mut node),
         }
         let mut above: Option<usize> = None;
@@ -88,6 +116,10 @@ impl Writer {
             }
             self.nodes.push(level);
             above = Some(self.nodes.len() - 1);
+            if let (Some(size), Some(_), true) = (size, thing.mesh(), depth == last) {
+                let target = json!({"node": self.nodes.len() - 1, "path": "scale"});
+                self.appears(target, size * placement.scale, placement.scale);
+            }
         }
         above.unwrap_or_else(|| {
             self.nodes.push(node);
@@ -114,6 +146,23 @@ impl Writer {
         accessor["max"] = json!(bound(f32::max));
         self.accessors.push(accessor);
         self.accessors.len() - 1
+    }
+
+    /// Adds a channel that holds one value at the frame, and another one from [`Later::START`] on.
+    fn appears(&mut self, target: Value, before: DVec3, after: DVec3) {
+        let values = [before, after].map(|v| v.as_vec3().to_array());
+        self.channel(target, values.as_flattened(), "VEC3", 3);
+    }
+
+    fn appears_number(&mut self, target: Value, before: f64, after: f64) {
+        self.channel(target, &[before as f32, after as f32], "SCALAR", 1);
+    }
+
+    fn channel(&mut self, target: Value, values: &[f32], kind: &str, width: usize) {
+        let input = self.accessor(&[0.0, Later::START as f32], "SCALAR", 1);
+        let output = self.accessor(values, kind, width);
+        self.channels.push(json!({"sampler": self.samplers.len(), "target": target}));
+        self.samplers.push(json!({"input": input, "output": output, "interpolation": "STEP"}));
     }
 
     fn mesh(&mut self, world: &World, mesh: usize, material: usize) -> usize {
@@ -188,6 +237,11 @@ impl Writer {
         let view = self.view(png.into_inner());
         json!({"bufferView": view, "mimeType": "image/png"})
     }
+}
+
+/// The target of a channel of KHR_animation_pointer.
+fn pointer(to: &str) -> Value {
+    json!({"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": to}}})
 }
 
 fn medium(medium: Medium) -> Value {
