@@ -271,6 +271,17 @@ impl<'a> Shading<'a> {
         }
     }
 
+    /// Reflection and transmission at a smooth interface that has no other lobes, the less probable one first; `None` if one
+    /// of the two does not exist. The weights are over the probabilities, as those of [`Shading::sample`].
+    #[inline(never)]
+    pub fn interface_branches(&self, transport: Transport) -> Option<[BsdfSample; 2]> {
+        // Samples ascend through all lobes with the number that chooses them.
+        let at = |u_lobe: f32| self.sample(transport, LobeSet::DELTA, u_lobe, Vec2::ZERO);
+        let (first, last) = (at(0.0)?, at(1.0 - 0.5 * f32::EPSILON)?);
+        let all = first.transmitted != last.transmitted && first.pdf_w + last.pdf_w >= 1.0 - f32::EPSILON;
+        all.then_some(if first.pdf_w < last.pdf_w { [first, last] } else { [last, first] })
+    }
+
     /// Samples the coat over a normal map, with the probability `share`, or else the lobes below it.
     #[inline(never)]
     fn sample_coated(

@@ -548,9 +548,9 @@ mod tests {
                     albedo: draw(4).normalize() * 0.9,
                     normal: (draw(5) - draw(6)).normalize(),
                     depth: draw(7).x,
+                    share: 1.0,
                 },
                 first: (!i.is_multiple_of(3)).then(|| FirstHit { p: draw(8), instance: (i % 10) as u32 }),
-                features_settled: true,
                 rejection: (i % 13 == 1).then_some(Cause::Splat),
             }
         })

@@ -314,11 +314,10 @@ mod tests {
             volume: Rgb::splat(0.3 * x),
             volume_photons: photons.map(|light| light * 0.7),
             features: if hit {
-                Features { albedo: Rgb::splat(0.5), normal: Vec3::Y, depth: 4.0 }
+                Features { albedo: Rgb::splat(0.5), normal: Vec3::Y, depth: 4.0, share: 1.0 }
             } else {
                 Features::default()
             },
-            features_settled: hit,
             rejection: None,
             first: hit.then_some(FirstHit { p: Vec3::X, instance: 3 }),
         }

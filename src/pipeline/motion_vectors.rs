@@ -38,6 +38,7 @@ pub(super) fn motion_vectors(
         scene,
         camera: &camera,
         interior,
+        splits: 0,
         max_depth: u32::MAX,
         indirect: Indirect::Photons,
         classes: ClassSet::ALL,

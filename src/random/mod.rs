@@ -244,6 +244,14 @@ impl Stream {
         Stream { chained: true, ..self }
     }
 
+    /// The stream of a branch that the path begins at vertex number `vertex`, independent of this stream. `number`, from
+    /// 0, counts the branches that begin there.
+    #[must_use]
+    pub fn branch(self, vertex: u32, number: u32) -> Stream {
+        let branch = u64::from(vertex) << 32 | (u64::from(number) + 1);
+        Stream { key: mix(self.key ^ branch.wrapping_mul(0x9e6c_63d0_876a_68de)), ..self }
+    }
+
     /// Random numbers at vertex number `vertex` of the path. Vertex 0 is its endpoint on the lens or light.
     #[inline]
     pub fn vertex(self, vertex: u32) -> Draws {

@@ -23,6 +23,9 @@ use crate::math::Rgb;
 /// of a single iteration show.
 pub const BANDS: u8 = 8;
 
+/// Number of wavelengths, in bands at equal distances, that a split camera path takes at dispersive glass.
+pub const SPREAD: u8 = 2;
+
 /// Channels of weights below this are treated as zero: [`Wavelength::inverse_weight`] is then zero, too.
 const MIN_WEIGHT: f32 = 1e-6;
 
@@ -55,7 +58,17 @@ impl WavelengthSample {
     #[inline]
     pub fn wavelength(self) -> Wavelength {
         let (nm, weight) = observer::sample(self.0);
-        Wavelength { nm, weight, band: Band(self.band().0 + 1) }
+        Wavelength { nm, weight, band: Band(self.band().0 + 1), pairing: 1.0 }
+    }
+
+    /// [`SPREAD`] wavelengths, in bands at equal distances and at one position within their bands: the wavelength of this
+    /// sample first.
+    #[inline]
+    pub fn spread(self) -> impl Iterator<Item = Wavelength> {
+        let (band, offset) = self.band();
+        let other = move |k: u8| WavelengthSample::within((band + k * (BANDS / SPREAD)) % BANDS, offset).wavelength();
+        let own = Wavelength { pairing: f32::from(SPREAD), ..self.wavelength() };
+        std::iter::once(own).chain((1..SPREAD).map(move |k| Wavelength { pairing: 0.0, ..other(k) }))
     }
 
     /// A wavelength for a path that carries only one RGB channel (0 to 2). The number `u`, in `[0, 1)`, draws the band
@@ -88,6 +101,9 @@ pub struct Wavelength {
     pub weight: Rgb,
     /// The band of the spectrum that contains the wavelength.
     pub band: Band,
+    /// Factor of the contribution when the path is connected to a light path with an equal [`WavelengthSample`]. Of the
+    /// wavelengths of a split path, only one is connected.
+    pub pairing: f32,
 }
 
 /// The band of the spectrum that contains a path's wavelength (1 to [`BANDS`]), or 0 for a path without a wavelength.

@@ -269,6 +269,15 @@ pub trait PathRecorder {
         let _ = survival;
     }
 
+    /// A branch of a camera path that splits follows, up to the matching [`PathRecorder::end_branch`]. The path then goes on
+    /// from where the branch began.
+    #[inline]
+    fn begin_branch(&mut self) {}
+
+    /// The last branch that has begun ends.
+    #[inline]
+    fn end_branch(&mut self) {}
+
     /// `technique` adds light to the camera path's own pixel at `level`: the kind of the path, `value` with visibility and
     /// kernel but without weight, and the weight. Depths count from 1, also for light from infinity.
     #[inline]

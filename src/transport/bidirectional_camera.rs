@@ -81,7 +81,8 @@ pub(super) fn record_surface(
     history.length += vertex.distance;
     let lobes = vertex.shading.bsdf.lobes();
     if lobes.intersects(LobeSet::SMOOTH) {
-        sample.store_features(lobes, || vertex.features(history.length));
+        let length = history.length;
+        history.features.store(lobes, || vertex.features(length));
     }
 }
 
@@ -98,8 +99,8 @@ pub(super) fn record_medium(
         Some(scattered) => history.scattered(scattered.lobe),
     }
     history.length += vertex.arrival.distance;
-    let features = || Features { albedo: vertex.albedo(), normal: vertex.wo, depth: history.length };
-    sample.store_features(LobeSet::BROAD, features);
+    let features = Features { albedo: vertex.albedo(), normal: vertex.wo, depth: history.length, share: 1.0 };
+    history.features.store(LobeSet::BROAD, || features);
 }
 
 impl<R: PathRecorder> CameraWalk<'_, R> {
@@ -232,7 +233,7 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
         let connections = connections * presence.chance;
         let mut value = vertex.throughput() * f_camera * f_light * light.throughput / (distance2 * connections);
         if let (true, Some(wavelength)) = (light.dispersed, vertex.wavelength()) {
-            value *= wavelength.inverse_weight();
+            value *= wavelength.inverse_weight() * wavelength.pairing;
         }
         if !self.finds(technique, value) {
             return;
@@ -316,9 +317,30 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
 }
 
 impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
+    const BRANCHES: bool = true;
+
     #[inline]
     fn spared(&self) -> f32 {
         self.shared.spared
+    }
+
+    #[inline]
+    fn splits(&self) -> u32 {
+        self.shared.camera_paths.splits
+    }
+
+    #[inline]
+    fn end(&mut self, share: f32) {
+        self.sample.features.add(&self.history.features, share);
+    }
+
+    #[inline]
+    fn branch(&mut self, follow: impl FnOnce(&mut Self)) {
+        let before = (self.mis, self.history, self.last, self.depth, self.lobes);
+        self.record.begin_branch();
+        follow(self);
+        self.record.end_branch();
+        (self.mis, self.history, self.last, self.depth, self.lobes) = before;
     }
 
     #[inline]

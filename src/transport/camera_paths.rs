@@ -53,6 +53,9 @@ pub struct CameraPaths<'a> {
     pub interior: InitialMedium,
     /// Largest number of segments of a path.
     pub max_depth: u32,
+    /// Number of smooth interfaces at which a path may be split into reflection and transmission; 0 for paths of one
+    /// branch.
+    pub splits: u32,
     /// Technique for indirect light in methods that gather photons.
     pub indirect: Indirect,
     /// Classes of paths (by kinds of bounces) whose light the picture shows.

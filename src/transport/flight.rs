@@ -118,6 +118,7 @@ pub(super) struct Split<'a, V> {
     pub scattered: Option<Scattered>,
     pub from: Vec3,
     pub wavelength: Option<Wavelength>,
+    pub share: f32,
     pub survival_scale: f32,
 }
 
@@ -162,6 +163,7 @@ impl<V> Split<'_, V> {
             opacity,
             next_event,
             wavelength: self.wavelength,
+            share: self.share,
             survival_scale: self.survival_scale,
             arrival: met,
         }

@@ -26,7 +26,7 @@ use super::glint::{Glints, Onward};
 use super::lobe_layers::{FirstScatter, LobeHistory, LobeRecord};
 use super::pass_through::{BulbHit, PassThroughHit};
 use super::photon_batch::{Scratch, Waiting};
-use super::pixel_sample::PixelSample;
+use super::pixel_sample::{BranchFeatures, PixelSample};
 use super::scattering_vertex::ScatterPoint;
 use super::segment::FirstHit;
 use super::shares::leads;
@@ -57,7 +57,10 @@ pub(super) struct GatheringWalk<'a, B, K, const PATHS: bool> {
     pub waiting: &'a mut Waiting,
     pub bandwidths: &'a mut B,
     pub max_depth: u32,
+    pub splits: u32,
     pub sample: PixelSample,
+    /// G-buffer of the path.
+    pub features: BranchFeatures,
     /// Length of the path so far (scene units).
     pub length: f32,
     /// Class of the path up to the last vertex: the kinds of its bounces.
@@ -249,7 +252,27 @@ impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, 
 }
 
 impl<'a, B: GatherBandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for GatheringWalk<'_, B, K, PATHS> {
+    const BRANCHES: bool = true;
     const SPLITS: bool = true;
+
+    #[inline]
+    fn splits(&self) -> u32 {
+        self.splits
+    }
+
+    #[inline]
+    fn end(&mut self, share: f32) {
+        self.sample.features.add(&self.features, share);
+    }
+
+    #[inline]
+    fn branch(&mut self, follow: impl FnOnce(&mut Self)) {
+        let scattering = (self.scattered_broadly, self.delta, self.glints, self.lobe_history);
+        let before = (self.length, self.suffix, self.lobes, self.last, self.features);
+        follow(self);
+        (self.scattered_broadly, self.delta, self.glints, self.lobe_history) = scattering;
+        (self.length, self.suffix, self.lobes, self.last, self.features) = before;
+    }
 
     #[inline]
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
@@ -273,7 +296,8 @@ impl<'a, B: GatherBandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gath
         let smooth = lobes & LobeSet::SMOOTH;
         // Lights and other surfaces that scatter nothing have features, too.
         if lobes != LobeSet::DELTA {
-            self.sample.store_features(lobes, || vertex.features(self.length));
+            let length = self.length;
+            self.features.store(lobes, || vertex.features(length));
         }
         self.lobes = lobes;
         if smooth.is_empty() {
@@ -479,7 +503,9 @@ impl CameraPaths<'_> {
             waiting: &mut scratch.waiting,
             bandwidths,
             max_depth: self.max_depth,
+            splits: self.splits,
             sample: PixelSample::default(),
+            features: BranchFeatures::NONE,
             length: 0.0,
             suffix: CameraSuffix::START,
             lobes: LobeSet::empty(),

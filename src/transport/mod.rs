@@ -55,7 +55,7 @@ pub use photon_batch::Scratch;
 pub use photon_merge::MergePhoton;
 pub use pixel_sample::{Features, PixelSample};
 pub use probe::{GatherPoint, Probe};
-pub use roulette::SPARED_BY_ROULETTE;
+pub use roulette::{MAX_SPLITS, SPARED_BY_ROULETTE};
 pub use scattering_vertex::{ScatterPoint, lit_side};
 pub use segment::{
     Arrival, End, FirstHit, MediumArrival, PrecomputedHit, ShadowRay, Start, Visibility, next_surface, shadow_ray,

@@ -31,6 +31,7 @@ use bumpalo::Bump;
 struct PathTracer<'a, R> {
     scene: &'a Scene,
     max_depth: u32,
+    splits: u32,
     classes: ClassSet,
     /// The first vertex, if light is recorded by its lobes.
     lobes: Option<LobeHistory>,
@@ -142,7 +143,7 @@ impl<R: PathRecorder> PathTracer<'_, R> {
         let instance = &self.scene.shapes.instances[vertex.surface.instance as usize];
         let came_from_catcher = std::mem::take(&mut self.on_catcher);
         if scattered.is_none() && instance.shadow_catcher {
-            self.record.caught(caught_light(self.scene, vertex, catchers));
+            self.record.caught(caught_light(self.scene, vertex, catchers).map(|light| light * vertex.share));
             self.on_catcher = true;
         }
         let emits = || self.scene.materials.list[vertex.surface.material as usize].emits();
@@ -156,9 +157,28 @@ impl<R: PathRecorder> PathTracer<'_, R> {
 }
 
 impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
+    const BRANCHES: bool = true;
+
     #[inline]
     fn spared(&self) -> f32 {
         SPARED_BY_ROULETTE
+    }
+
+    #[inline]
+    fn splits(&self) -> u32 {
+        self.splits
+    }
+
+    #[inline]
+    fn end(&mut self, share: f32) {
+        self.sample.features.add(&self.history.features, share);
+    }
+
+    #[inline]
+    fn branch(&mut self, follow: impl FnOnce(&mut Self)) {
+        let before = (self.lobes, self.history, self.last, self.depth, self.on_catcher);
+        follow(self);
+        (self.lobes, self.history, self.last, self.depth, self.on_catcher) = before;
     }
 
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
@@ -275,11 +295,12 @@ pub fn path_sample(
 ) {
     *sample = PixelSample::default();
     let history = PathHistory::START;
-    let CameraPaths { scene, max_depth, classes, .. } = *camera_paths;
+    let CameraPaths { scene, max_depth, splits, classes, .. } = *camera_paths;
     let lobes = camera_paths.lobes.then(LobeHistory::default);
     let last = Receiver::anywhere(start.origin);
     let (depth, on_catcher) = (0, false);
-    let mut tracer = PathTracer { scene, max_depth, classes, lobes, sample, history, last, depth, on_catcher, record };
+    let mut tracer =
+        PathTracer { scene, max_depth, splits, classes, lobes, sample, history, last, depth, on_catcher, record };
     walk(camera_paths.scene, arena, start, *stream, Transport::Radiance, camera_paths.max_depth, &mut tracer);
 }
 

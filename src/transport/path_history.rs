@@ -1,5 +1,6 @@
 //! The history of a camera path, which determines the class of the light that it finds.
 
+use super::pixel_sample::BranchFeatures;
 use super::shares::leads;
 use crate::bsdf::LobeSet;
 use crate::plan::{CameraSuffix, ClassSet, Event};
@@ -15,10 +16,18 @@ pub(super) struct PathHistory {
     pub length: f32,
     /// Whether all vertices so far scattered the path by delta lobes.
     pub delta: bool,
+    /// G-buffer of the path.
+    pub features: BranchFeatures,
 }
 
 impl PathHistory {
-    pub const START: PathHistory = PathHistory { suffix: CameraSuffix::START, lobes: None, length: 0.0, delta: true };
+    pub const START: PathHistory = PathHistory {
+        suffix: CameraSuffix::START,
+        lobes: None,
+        length: 0.0,
+        delta: true,
+        features: BranchFeatures::NONE,
+    };
 
     /// Records that the last vertex scattered the path by `lobe`.
     #[inline]

@@ -7,7 +7,8 @@ use crate::bsdf::LobeSet;
 use crate::math::{Rgb, Vec3};
 
 /// G-buffer of one camera path, at its first vertex that scatters broadly; at its last narrow one if there is none, and
-/// zero if all are perfect mirrors or clear glass.
+/// zero if all are perfect mirrors or clear glass. If the path is split, albedo and normal are sums over its branches,
+/// weighted by their shares, and depth is the mean.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Features {
     /// Directional albedo.
@@ -16,6 +17,43 @@ pub struct Features {
     pub normal: Vec3,
     /// Length of the path up to the vertex (scene units).
     pub depth: f32,
+    /// Sum of the shares of the branches of the path that have such a vertex.
+    pub share: f32,
+}
+
+impl Features {
+    /// Adds the features of a branch, if it has any and a share of the path.
+    #[inline]
+    pub(super) fn add(&mut self, branch: &BranchFeatures, share: f32) {
+        if let Some(features) = branch.features.filter(|_| share > 0.0) {
+            self.albedo += features.albedo * share;
+            self.normal += features.normal * share;
+            self.share += share;
+            self.depth += (features.depth - self.depth) * (share / self.share);
+        }
+    }
+}
+
+/// G-buffer of one branch of a camera path so far.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct BranchFeatures {
+    features: Option<Features>,
+    /// Whether `features` are those of a vertex that scatters broadly, so that later vertices do not replace them.
+    settled: bool,
+}
+
+impl BranchFeatures {
+    /// `BranchFeatures` of a branch without vertices.
+    pub const NONE: BranchFeatures = BranchFeatures { features: None, settled: false };
+
+    /// Stores the G-buffer of a vertex with these lobes, unless the branch has met one that scatters broadly.
+    #[inline]
+    pub fn store(&mut self, lobes: LobeSet, features: impl FnOnce() -> Features) {
+        if !self.settled {
+            self.features = Some(features());
+            self.settled = lobes.intersects(LobeSet::BROAD);
+        }
+    }
 }
 
 /// The contribution of one camera path to its pixel. Radiance is linear RGB.
@@ -37,8 +75,6 @@ pub struct PixelSample {
     pub volume_photons: [Rgb; MAX_LEVELS],
     /// G-buffer of the camera path.
     pub features: Features,
-    /// Whether `features` are those of a vertex that scatters broadly, so that later vertices do not replace them.
-    pub features_settled: bool,
     /// First visible hit of the camera path; `None` if it hits nothing.
     pub first: Option<FirstHit>,
     /// Why the sample has to be rejected: the source of its first value that is not finite; `None` if all are finite.
@@ -50,15 +86,6 @@ impl PixelSample {
     #[cold]
     pub fn reject(&mut self, cause: Cause) {
         self.rejection.get_or_insert(cause);
-    }
-
-    /// Stores the G-buffer of a vertex with these lobes, unless the path has met one that scatters broadly.
-    #[inline]
-    pub fn store_features(&mut self, lobes: LobeSet, features: impl FnOnce() -> Features) {
-        if !self.features_settled {
-            self.features = features();
-            self.features_settled = lobes.intersects(LobeSet::BROAD);
-        }
     }
 
     /// Radiance estimate at a bandwidth level (from 0, the smallest), the sum of all parts.

@@ -16,6 +16,21 @@ pub const SPARED_BY_ROULETTE: f32 = 0.25;
 /// Smallest probability of continuing, which bounds the weight of surviving paths.
 const MIN_SURVIVAL: f32 = 0.02;
 
+/// Largest number of smooth interfaces at which a camera path splits into reflection and transmission.
+pub const MAX_SPLITS: u32 = 4;
+/// Share of the weight of a camera path above which the weaker branch behind a smooth interface is always followed. A
+/// weaker one is followed with a probability in proportion to its share. So a path has at most about the reciprocal of
+/// this number of branches.
+const MIN_BRANCH_SHARE: f32 = 0.25;
+/// Smallest share of the weight of a camera path that is split into several wavelengths.
+pub(super) const MIN_DISPERSED_SHARE: f32 = 0.5;
+
+/// Probability of following the weaker branch behind a smooth interface, which has this share of the path's weight.
+#[inline]
+pub(super) fn branch_chance(share: f32) -> f32 {
+    (share / MIN_BRANCH_SHARE).min(1.0)
+}
+
 /// Probability that a path of `depth` bounces continues, if it is expected to keep the fraction `expected` of its
 /// weight. `mirrored` tells whether it continues by a delta lobe; it is called for long paths only.
 #[inline]

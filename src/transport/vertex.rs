@@ -40,6 +40,9 @@ pub struct Vertex<'v, 'a> {
     /// The wavelength of the path; `None` if it has not met dispersive glass (this vertex included). The throughput
     /// contains its weight.
     pub wavelength: Option<Wavelength>,
+    /// Share of this branch in a path that has been split: its probability without splits, over its probability with
+    /// them. 1 if no split has happened.
+    pub share: f32,
     pub(super) survival_scale: f32,
 }
 
@@ -51,6 +54,7 @@ impl Vertex<'_, '_> {
             albedo: self.shading.albedo(LobeSet::ALL),
             normal: if n.dot(self.wo) < 0.0 { -n } else { n },
             depth: length,
+            share: 1.0,
         }
     }
 
@@ -102,6 +106,8 @@ pub struct MediumVertex {
     pub next_event: f32,
     /// The wavelength of the path; `None` if it has not met dispersive glass.
     pub wavelength: Option<Wavelength>,
+    /// Share of this branch in a path that has been split, as [`Vertex::share`].
+    pub share: f32,
     pub(super) survival_scale: f32,
 }
 
@@ -166,15 +172,34 @@ pub enum Next {
 
 /// Receives the vertices of a walk, which traces one path, and decides how the path continues. Each rendering algorithm
 /// is a visitor.
-pub trait Visitor<'a> {
+pub trait Visitor<'a>: Sized {
     /// Whether the walk splits at media (`flight.rs`): it shows one vertex in every medium and continues to the surface
     /// behind without scattering there.
     const SPLITS: bool = false;
+    /// Whether paths may split: [`Visitor::splits`] may be above 0.
+    const BRANCHES: bool = false;
     /// Fraction of the initial throughput down to which roulette does not end a path (except trapped light). Below it,
     /// a path survives with probability throughput over that fraction.
     #[inline]
     fn spared(&self) -> f32 {
         1.0
+    }
+    /// Number of smooth interfaces at which one path may be split into reflection and transmission. Only the first vertices of a
+    /// path split, as long as all its lobes are delta lobes.
+    #[inline]
+    fn splits(&self) -> u32 {
+        0
+    }
+    /// Lets `follow` trace one branch of the path, and restores the visitor's state of the path afterwards. Visitors whose
+    /// paths are split implement it.
+    #[inline]
+    fn branch(&mut self, follow: impl FnOnce(&mut Self)) {
+        follow(self);
+    }
+    /// The path ends, or one of its branches, which has this share of the path ([`Vertex::share`]).
+    #[inline]
+    fn end(&mut self, share: f32) {
+        let _ = share;
     }
     /// The path arrives at a surface vertex; the result decides how it continues. `scattered` describes the scattering
     /// at the previous vertex; `None` at the first.

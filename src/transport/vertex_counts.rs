@@ -87,14 +87,26 @@ struct Count<'a, const THROUGH: bool> {
     textured: u32,
     open: Vec<Open>,
     narrow: bool,
+    /// Number of smooth interfaces at which the path may be split.
+    splits: u32,
     /// Length of the path up to the first vertex that is not a perfect mirror or clear glass.
     length: f32,
 }
 
 impl<const THROUGH: bool> Count<'_, THROUGH> {
-    fn new(scene: &Scene) -> Count<'_, THROUGH> {
-        let open = Vec::new();
-        Count { scene, all: 0, to_broad: 0, media: 0, media_to_broad: 0, textured: 0, open, narrow: true, length: 0.0 }
+    fn new(scene: &Scene, splits: u32) -> Count<'_, THROUGH> {
+        Count {
+            scene,
+            all: 0,
+            to_broad: 0,
+            media: 0,
+            media_to_broad: 0,
+            textured: 0,
+            open: Vec::new(),
+            narrow: true,
+            splits,
+            length: 0.0,
+        }
     }
 
     /// Numbers of all surface vertices, of those up to the first broad lobe, of listed ones, of vertices in media, of
@@ -119,7 +131,18 @@ impl<const THROUGH: bool> Count<'_, THROUGH> {
 }
 
 impl<'a, const THROUGH: bool> Visitor<'a> for Count<'_, THROUGH> {
+    const BRANCHES: bool = true;
     const SPLITS: bool = THROUGH;
+
+    fn splits(&self) -> u32 {
+        self.splits
+    }
+
+    fn branch(&mut self, follow: impl FnOnce(&mut Self)) {
+        let narrow = self.narrow;
+        follow(self);
+        self.narrow = narrow;
+    }
 
     fn medium(&mut self, _: &MediumVertex, _: Option<Scattered>) -> Next {
         self.passed();
@@ -245,7 +268,8 @@ fn count_path<'a, const THROUGH: bool>(
     transport: Transport,
 ) -> Count<'a, THROUGH> {
     let (scene, max_depth) = (camera_paths.scene, camera_paths.max_depth);
-    let mut count = Count::<THROUGH>::new(scene);
+    let splits = if transport == Transport::Radiance { camera_paths.splits } else { 0 };
+    let mut count = Count::<THROUGH>::new(scene, splits);
     if let Some((start, stream)) = start {
         walk(scene, &Bump::new(), &start, stream, transport, max_depth, &mut count);
     }

@@ -119,6 +119,7 @@ mod tests {
             opacity: 1.0,
             next_event: 1.0,
             wavelength: None,
+            share: 1.0,
             survival_scale: 1.0,
         }
     }

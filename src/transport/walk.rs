@@ -5,19 +5,19 @@ use super::fire::MediumEmission;
 use super::flight::{Fly, Split};
 use super::interior::Interior;
 use super::pass_through::{BulbHit, PassThroughHit, for_each_bulb, for_each_pass_through_light};
-use super::roulette::late_survival;
+use super::roulette::{MIN_DISPERSED_SHARE, branch_chance, late_survival};
 use super::scattering_vertex::ScatterPoint;
 use super::segment::{
     Arrival, Attenuate, Clear, End, MediumArrival, PrecomputedHit, Start, camera_token, next_vertex, token,
 };
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
-use crate::bsdf::{LobeSet, Transport};
+use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::math::{Rgb, Vec3, is_lit};
 use crate::medium::FlightDensity;
 use crate::random::{Draws, Purpose, Stream};
 use crate::scene::Scene;
 use crate::scene::contact::ContactPoint;
-use crate::spectrum::{Wavelength, WavelengthSample};
+use crate::spectrum::{SPREAD, Wavelength, WavelengthSample};
 use bumpalo::Bump;
 
 /// The start of a camera path or light path.
@@ -127,27 +127,13 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
         in_medium: false,
         leaving,
         wavelength: None,
+        splits: visitor.splits(),
+        share: 1.0,
     };
-    let mut known = first;
-    while path.depth <= max_depth {
-        let (end, flight) = path.travel::<V, BESIDES>(known, visitor);
-        known = &PrecomputedHit::Unknown;
-        if scene.survey.hidden_solids && path.depth == 1 && transport == Transport::Radiance {
-            path.enter_hidden_solids(&end);
-        }
-        let goes_on = match end {
-            End::Surface(arrival) => path.surface::<V, BESIDES>(arrival, flight, visitor),
-            End::Medium(met) => path.medium(met, flight, visitor),
-            End::Escaped(left) => {
-                visitor.escape(path.direction, path.throughput * left, path.scattered, flight);
-                None
-            }
-            End::Lost => None,
-        };
-        if goes_on.is_none() {
-            return;
-        }
-        path.depth += 1;
+    if V::BRANCHES {
+        path.follow_branch::<V, BESIDES>(first, visitor);
+    } else {
+        path.follow::<V, BESIDES>(first, visitor);
     }
 }
 
@@ -161,6 +147,7 @@ fn end<'a, V: Visitor<'a>>(throughput: Rgb, visitor: &mut V) -> Option<()> {
 }
 
 /// State of a path during the walk.
+#[derive(Clone, Copy)]
 struct Path<'a> {
     scene: &'a Scene,
     arena: &'a Bump,
@@ -188,9 +175,46 @@ struct Path<'a> {
     /// The point on a surface that the path leaves, if other surfaces touch it there.
     leaving: Option<ContactPoint>,
     wavelength: Option<Wavelength>,
+    /// Number of further smooth interfaces at which the path may be split; 0 after a lobe that is not delta.
+    splits: u32,
+    /// Share of this branch in the path, see [`Vertex::share`].
+    share: f32,
 }
 
 impl<'a> Path<'a> {
+    /// Follows the path from its current vertex to its end. `first` is the hit of its next ray, if it is known.
+    #[inline(always)]
+    fn follow<V: Visitor<'a>, const BESIDES: u8>(&mut self, first: &PrecomputedHit, visitor: &mut V) {
+        let mut known = first;
+        while self.depth <= self.max_depth {
+            let (end, flight) = self.travel::<V, BESIDES>(known, visitor);
+            known = &PrecomputedHit::Unknown;
+            if self.scene.survey.hidden_solids && self.depth == 1 && self.transport == Transport::Radiance {
+                self.enter_hidden_solids(&end);
+            }
+            let goes_on = match end {
+                End::Surface(arrival) => self.surface::<V, BESIDES>(arrival, flight, visitor),
+                End::Medium(met) => self.medium(met, flight, visitor),
+                End::Escaped(left) => {
+                    visitor.escape(self.direction, self.throughput * left, self.scattered, flight);
+                    None
+                }
+                End::Lost => None,
+            };
+            if goes_on.is_none() {
+                return;
+            }
+            self.depth += 1;
+        }
+    }
+
+    /// [`Path::follow`] for paths that may split, and for their branches.
+    #[inline(never)]
+    fn follow_branch<V: Visitor<'a>, const BESIDES: u8>(&mut self, first: &PrecomputedHit, visitor: &mut V) {
+        self.follow::<V, BESIDES>(first, visitor);
+        visitor.end(self.share);
+    }
+
     /// Follows the path to the next vertex. Returns where the segment ends, and the probability densities of flight
     /// through media along it.
     #[inline(always)]
@@ -199,7 +223,7 @@ impl<'a> Path<'a> {
         met: &PrecomputedHit,
         visitor: &mut V,
     ) -> (End, FlightDensity) {
-        let Path { scene, throughput, depth, scattered, wavelength, survival_scale, origin, .. } = *self;
+        let Path { scene, throughput, depth, scattered, wavelength, survival_scale, share, origin, .. } = *self;
         let draws = self.stream.vertex(depth - 1);
         let camera = depth == 1 && self.transport == Transport::Radiance;
         let token =
@@ -213,7 +237,7 @@ impl<'a> Path<'a> {
         } else if V::SPLITS {
             let from = origin;
             let mut split =
-                Split { scene, visitor, throughput, draws, depth, scattered, from, wavelength, survival_scale };
+                Split { scene, visitor, throughput, draws, depth, scattered, from, wavelength, share, survival_scale };
             next_vertex(scene, start, met, &mut split)
         } else {
             let (from_medium, from_infinity) = (self.in_medium, self.far && depth == 1);
@@ -262,7 +286,7 @@ impl<'a> Path<'a> {
     /// Scatters the path in a medium; `None` ends it.
     #[inline(always)]
     fn medium<V: Visitor<'a>>(&mut self, met: MediumArrival, flight: FlightDensity, visitor: &mut V) -> Option<()> {
-        let Path { scene, depth, wavelength, survival_scale, reach, .. } = *self;
+        let Path { scene, depth, wavelength, survival_scale, share, reach, .. } = *self;
         let arriving = self.throughput * met.weight;
         // The contribution of light far from the scene falls off with the squared distance.
         let back = (reach * reach / met.p.distance_squared(scene.lights.sky().center)).min(1.0);
@@ -279,6 +303,7 @@ impl<'a> Path<'a> {
             opacity: 1.0,
             next_event: 1.0,
             wavelength,
+            share,
             survival_scale: survival_scale * back,
         };
         // A medium may not scatter the channel that was sampled.
@@ -302,6 +327,7 @@ impl<'a> Path<'a> {
         self.scattered = Some(Scattered { lobe: sample.lobe, pdf_w: sample.pdf_w * survival });
         (self.origin, self.direction) = (vertex.arrival.p, sample.wi);
         (self.interior, self.in_medium, self.leaving) = (vertex.arrival.interior, true, None);
+        self.splits = 0;
         Some(())
     }
 
@@ -313,9 +339,24 @@ impl<'a> Path<'a> {
         flight: FlightDensity,
         visitor: &mut V,
     ) -> Option<()> {
-        let Arrival { ref surface, eta, ref crossing, interior: here, transmittance, distance } = arrival;
+        self.throughput *= arrival.transmittance;
+        if V::BRANCHES && BESIDES >= DISPERSION && self.takes_wavelengths(&arrival) {
+            self.split_wavelengths::<V, BESIDES>(&arrival, flight, visitor);
+            return None;
+        }
+        self.scatter::<V, BESIDES>(&arrival, flight, visitor)
+    }
+
+    /// Shows the visitor a surface vertex and scatters the path there; `None` ends it.
+    #[inline(always)]
+    fn scatter<V: Visitor<'a>, const BESIDES: u8>(
+        &mut self,
+        arrival: &Arrival,
+        flight: FlightDensity,
+        visitor: &mut V,
+    ) -> Option<()> {
+        let Arrival { ref surface, eta, ref crossing, interior: here, distance, .. } = *arrival;
         let Path { scene, depth, transport, .. } = *self;
-        self.throughput *= transmittance;
         let dispersed = match crossing {
             Some(crossing) if BESIDES >= DISPERSION && crossing.disperses(scene) => Some(crossing),
             _ => None,
@@ -344,6 +385,7 @@ impl<'a> Path<'a> {
             draws,
             flight,
             wavelength: self.wavelength,
+            share: self.share,
             survival_scale: self.survival_scale,
         };
         let (set, chance) = match visitor.surface(&vertex, self.scattered) {
@@ -362,23 +404,125 @@ impl<'a> Path<'a> {
         if !draws.happens(survival, Purpose::Roulette) {
             return end(self.throughput, visitor);
         }
+        let going = survival * chance;
+        // Radiance grows with the squared index of refraction.
+        let scale = if crossing.is_some() && transport == Transport::Radiance {
+            let eta = if self.direction.dot(surface.ng) < 0.0 { eta } else { 1.0 / eta };
+            eta * eta
+        } else {
+            1.0
+        };
+        if V::BRANCHES
+            && self.splits > 0
+            && set == LobeSet::DELTA
+            && let Some(branches) = shading.interface_branches(transport)
+        {
+            self.split_interface::<V, BESIDES>(&vertex, branches, (going, scale), visitor);
+            return Some(());
+        }
         let lobe = draws.one_if(shading.bsdf.has_several_lobes(), Purpose::Lobe);
         let sample = shading.sample(transport, set, lobe, draws.two(Purpose::Direction))?;
-        visitor.scatter(&vertex, &sample);
-        let going = survival * chance;
+        self.leave(&vertex, &sample, (going, scale), visitor);
+        Some(())
+    }
+
+    /// Continues the path from `vertex` along `sample`. The visitor and roulette let it continue with the probability
+    /// `going`; radiance grows by the factor `scale` behind the surface.
+    #[inline(always)]
+    fn leave<V: Visitor<'a>>(
+        &mut self,
+        vertex: &Vertex<'_, 'a>,
+        sample: &BsdfSample,
+        (going, scale): (f32, f32),
+        visitor: &mut V,
+    ) {
+        visitor.scatter(vertex, sample);
         self.throughput *= sample.weight / going;
         self.scattered = Some(Scattered { lobe: sample.lobe, pdf_w: sample.pdf_w * going });
-        if sample.transmitted && crossing.is_some() && transport == Transport::Radiance {
-            // Radiance grows with the squared index of refraction. A path that has entered a dense medium has lost
-            // nothing and regains the factor when it leaves, so roulette must not treat the factor as absorption.
-            let eta = if self.direction.dot(surface.ng) < 0.0 { eta } else { 1.0 / eta };
-            self.survival_scale *= eta * eta;
+        if sample.transmitted {
+            // A path that has entered a dense medium has lost nothing and regains the factor when it leaves, so roulette
+            // must not treat the factor as absorption.
+            self.survival_scale *= scale;
+        }
+        if sample.lobe != LobeSet::DELTA {
+            self.splits = 0;
         }
         self.direction = sample.wi;
-        self.origin = surface.ray_origin(sample.wi);
-        (self.in_medium, self.leaving) = (false, ContactPoint::touching(surface));
-        self.interior = if sample.transmitted { behind } else { here };
-        Some(())
+        self.origin = vertex.surface.ray_origin(sample.wi);
+        (self.in_medium, self.leaving) = (false, ContactPoint::touching(vertex.surface));
+        self.interior = if sample.transmitted { vertex.interior_behind } else { vertex.interior };
+    }
+
+    /// Splits the path at a smooth interface: follows its weaker branch, if roulette lets it, to the end, and continues the
+    /// path along the stronger one.
+    #[inline(never)]
+    fn split_interface<V: Visitor<'a>, const BESIDES: u8>(
+        &mut self,
+        vertex: &Vertex<'_, 'a>,
+        [weak, strong]: [BsdfSample; 2],
+        (going, scale): (f32, f32),
+        visitor: &mut V,
+    ) {
+        self.splits -= 1;
+        let chance = branch_chance(self.share * weak.pdf_w);
+        if vertex.draws.happens(chance, Purpose::Lobe) {
+            let mut branch = *self;
+            branch.stream = self.stream.branch(self.depth, 0);
+            branch.take_share(weak.pdf_w / chance);
+            visitor.branch(|visitor| {
+                branch.leave(vertex, &weak, (going, scale), visitor);
+                branch.depth += 1;
+                branch.follow_branch::<V, BESIDES>(&PrecomputedHit::Unknown, visitor);
+            });
+        }
+        self.take_share(strong.pdf_w);
+        self.leave(vertex, &strong, (going, scale), visitor);
+    }
+
+    /// Reduces the path to a branch that has the fraction `share` of its weight. Roulette does not treat this as a loss.
+    #[inline]
+    fn take_share(&mut self, share: f32) {
+        self.share *= share;
+        self.throughput *= share;
+        self.survival_scale /= share;
+    }
+
+    /// Whether the path meets dispersive glass for the first time, and splits into several wavelengths there.
+    #[inline]
+    fn takes_wavelengths(&self, arrival: &Arrival) -> bool {
+        self.splits > 0
+            && self.wavelength.is_none()
+            && self.share >= MIN_DISPERSED_SHARE
+            && arrival.crossing.as_ref().is_some_and(|crossing| crossing.disperses(self.scene))
+    }
+
+    /// Follows one branch of the path for each of several wavelengths.
+    #[inline(never)]
+    fn split_wavelengths<V: Visitor<'a>, const BESIDES: u8>(
+        &mut self,
+        arrival: &Arrival,
+        flight: FlightDensity,
+        visitor: &mut V,
+    ) {
+        for (k, wavelength) in self.wavelength_sample.spread().enumerate() {
+            let mut branch = *self;
+            if k > 0 {
+                branch.stream = self.stream.branch(self.depth, k as u32);
+            }
+            branch.take_share(1.0 / f32::from(SPREAD));
+            branch.throughput *= wavelength.weight;
+            branch.wavelength = Some(wavelength);
+            visitor.branch(|visitor| {
+                if branch.scatter::<V, BESIDES>(arrival, flight, visitor).is_some() {
+                    branch.depth += 1;
+                    branch.follow_branch::<V, BESIDES>(&PrecomputedHit::Unknown, visitor);
+                } else {
+                    visitor.end(branch.share);
+                }
+            });
+        }
+        // Nothing of the path is left.
+        self.share = 0.0;
     }
 
     /// The path's wavelength, which it takes at the first dispersive glass. It does so even if it is reflected: the

@@ -39,6 +39,7 @@ mod profiles;
 mod progressive;
 mod shadow_rays;
 mod smoke;
+mod splitting;
 mod stability;
 mod stopping;
 mod unseen;

@@ -541,6 +541,7 @@ impl<'a> Lab<'a> {
             scene,
             camera,
             interior: initial_media.camera,
+            splits: 0,
             max_depth: 12,
             indirect: Indirect::Photons,
             classes: ClassSet::ALL,

@@ -249,6 +249,7 @@ fn rays_start_in_the_medium_of_the_film() {
         scene: &scene,
         camera: &camera,
         interior,
+        splits: 0,
         max_depth: 8,
         indirect: Indirect::Photons,
         classes,

@@ -144,7 +144,7 @@ pub fn point_light(p: DVec3, intensity: f32) -> PunctualLight {
 pub fn camera_paths<'a>(scene: &'a Scene, camera: &'a Camera) -> CameraPaths<'a> {
     let interior = InitialMedia::of(scene, camera).camera;
     let (indirect, classes) = (Indirect::Photons, ClassSet::ALL);
-    CameraPaths { scene, camera, interior, max_depth: u32::MAX, indirect, classes, lobes: false, stop: None }
+    CameraPaths { scene, camera, interior, max_depth: u32::MAX, splits: 0, indirect, classes, lobes: false, stop: None }
 }
 
 /// Builds a valid scene; panics if it is invalid.

@@ -104,7 +104,7 @@ mod tests {
         let mut pixel = PixelAccumulator::new(1, 0, [1.0; 2]);
         for pass in 1..=finite + broken {
             let depth = if albedo.is_some() { 1.0 } else { 0.0 };
-            let features = Features { albedo: albedo.unwrap_or_default(), normal: Vec3::ZERO, depth };
+            let features = Features { albedo: albedo.unwrap_or_default(), normal: Vec3::ZERO, depth, share: 1.0 };
             let direct = if pass > broken { light } else { Rgb::NAN };
             pixel.add(pass, &PixelSample { direct, features, ..PixelSample::default() }, None);
         }

@@ -117,11 +117,13 @@ struct Contribution {
 struct Contributions {
     list: Vec<Contribution>,
     survival: CameraSurvival,
+    /// [`Contributions::survival`] where the current branches of the path began.
+    branches: Vec<CameraSurvival>,
 }
 
 impl Contributions {
     fn new() -> Contributions {
-        Contributions { list: Vec::new(), survival: CameraSurvival::START }
+        Contributions { list: Vec::new(), survival: CameraSurvival::START, branches: Vec::new() }
     }
 }
 
@@ -133,6 +135,14 @@ impl PathRecorder for Contributions {
 
     fn continues(&mut self, survival: impl Fn(f32) -> f32) {
         self.survival.continues(survival);
+    }
+
+    fn begin_branch(&mut self) {
+        self.branches.push(self.survival);
+    }
+
+    fn end_branch(&mut self) {
+        self.survival = self.branches.pop().unwrap_or(CameraSurvival::START);
     }
 
     fn arrival(&mut self, _: Technique, of: PathKind, _: usize, value: Rgb, weight: f32) {

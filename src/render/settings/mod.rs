@@ -23,7 +23,7 @@ use crate::photon::kernel;
 use crate::plan::{ClassSet, Owner, Search, classes_in};
 use crate::scene::{Scene, Survey};
 use crate::stop::Stop;
-use crate::transport::{CameraPaths, Indirect, InitialMedia, MAX_LEVELS};
+use crate::transport::{CameraPaths, Indirect, InitialMedia, MAX_LEVELS, MAX_SPLITS};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -225,7 +225,10 @@ impl Settings {
         let Settings { max_depth, indirect, classes, lobes, .. } = *self;
         // Pictures per technique are sums over paths, so an iteration cannot be taken back from them.
         let stop = (!self.techniques).then_some(&self.stop);
-        CameraPaths { scene, camera, interior: initial_media.camera, max_depth, indirect, classes, lobes, stop }
+        // A Markov chain mutates a path of one branch.
+        let splits = if self.method.has_chains() || !scene.survey.narrow_lobes { 0 } else { MAX_SPLITS };
+        let interior = initial_media.camera;
+        CameraPaths { scene, camera, interior, max_depth, splits, indirect, classes, lobes, stop }
     }
 
     /// Returns a function that makes a pixel before the first iteration, from its largest initial bandwidths by kind of

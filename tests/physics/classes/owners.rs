@@ -89,8 +89,17 @@ fn random_paths(scene: &Scene, walks: u32, found: &mut HashSet<Whole>) {
     let initial_media = InitialMedia::new(scene, camera.position());
     let classes = caustique::plan::ClassSet::ALL;
     let (interior, indirect) = (initial_media.camera, Indirect::Photons);
-    let camera_paths =
-        CameraPaths { scene, camera: &camera, interior, max_depth: 7, indirect, classes, lobes: false, stop: None };
+    let camera_paths = CameraPaths {
+        scene,
+        camera: &camera,
+        interior,
+        max_depth: 7,
+        splits: 0,
+        indirect,
+        classes,
+        lobes: false,
+        stop: None,
+    };
     let pass = LightPaths::new(5, 0, Domain::Test, walks, 7);
     for index in 0..walks {
         let arena = bumpalo::Bump::new();
