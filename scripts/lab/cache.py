@@ -51,8 +51,8 @@ def scene_key(path):
 
 
 def outside(path):
-    """The kind of a scene outside the project's folder of scenes: an animated shot, a still of one, or a twin."""
-    return {"shots": "shot", "stills": "still"}.get(path.parent.name, "twin")
+    """The kind of a scene outside the project's folder of scenes: an animated shot, a still of one, a twin, or a user's file."""
+    return {"shots": "shot", "stills": "still", "twins": "twin"}.get(path.parent.name, "file")
 
 
 def frame_suffix(frame):

@@ -2,7 +2,7 @@
 
 import math
 
-FIGURES = ("relmse", "relmse_trimmed", "flip", "grain", "grain_trimmed")
+FIGURES = ("relmse", "relmse_trimmed", "flip", "grain", "grain_trimmed", "flip_inside", "grain_inside")
 
 
 def ratio(ours, other, figure, floor):
@@ -40,8 +40,9 @@ def goals(cells, main):
     """
     found = {}
     for figure in FIGURES:
-        floor = (lambda cell: cell["floor"]) if figure != "flip" else (lambda cell: 1e-6)
-        whole = [cell for cell in cells if main in cell["ours"]]
+        floor = (lambda cell: cell["floor"]) if not figure.startswith("flip") else (lambda cell: 1e-6)
+        # Scenes without glass and mirrors have no errors inside.
+        whole = [cell for cell in cells if main in cell["ours"] and figure in cell["ours"][main]["delivered"]]
         beside = []
         for cell in whole:
             rivals = [pictures["oidn"] for pictures in cell["peers"].values() if "oidn" in pictures]
@@ -49,7 +50,12 @@ def goals(cells, main):
                 beside.append(ratio(cell["ours"][main]["delivered"], best(rivals, figure), figure, floor(cell)))
         found[f"{main} / best peer with OIDN: {figure}"] = summary(beside)
         for name, chosen in ((main, [main]), ("all methods", None)):
-            pairs = [(cell, cell["ours"][m]) for cell in cells for m in (chosen or cell["ours"]) if m in cell["ours"]]
+            pairs = [
+                (cell, cell["ours"][m])
+                for cell in cells
+                for m in (chosen or cell["ours"])
+                if figure in cell["ours"].get(m, {}).get("delivered", {})
+            ]
             alone = [ratio(p["delivered"], p["oidn"], figure, floor(cell)) for cell, p in pairs if "oidn" in p]
             found[f"{name} / OIDN alone: {figure}"] = summary(alone)
             own = [

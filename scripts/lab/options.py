@@ -57,7 +57,7 @@ KNOWN = {
     "render_options": Argument(shlex.split, "more options of our renders, one argument in quotes"),
     "rounds": Argument(int, "number of repetitions; the fastest counts"),
     "saves": Argument(int, "number of checkpoints to time"),
-    "scenes": Argument(names, "names below scenes/, such as pool,second/still,twin/pool"),
+    "scenes": Argument(names, "names below scenes/, such as pool,second/still,twin/pool, or paths that end in .glb"),
     "seconds": Argument(budget, "seconds or core-seconds of a render"),
     "seed": Argument(int, "seed of the random moments"),
     "seeds": Argument(int, "number of renders of each kind, with different seeds"),

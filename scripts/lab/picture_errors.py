@@ -30,6 +30,15 @@ class Layers:
         keys = [key for key, value in self.header.items() if key.startswith("cryptomatte/") and value == name]
         return json.loads(self.header[keys[0].removesuffix("name") + "manifest"])
 
+    def smooth(self):
+        """Which pixels show smooth glass or a mirror, as `caustique compare` finds them."""
+        ids, names = self.manifest("CryptoMaterial"), json.loads(self.header["caustique"])["smooth_materials"]
+        wanted = np.array([int(ids[name], 16) for name in names], np.uint32)
+        ranks = [self.channels[f"CryptoMaterial{index:02}.{pair[0]}"] for index in range(3) for pair in ("rg", "ba")]
+        shares = [self.channels[f"CryptoMaterial{index:02}.{pair[1]}"] for index in range(3) for pair in ("rg", "ba")]
+        ids = [np.ascontiguousarray(rank, np.float32).view(np.uint32) for rank in ranks]
+        return sum(np.where(np.isin(of, wanted), share, 0) for of, share in zip(ids, shares, strict=True)) > 0.5
+
 
 def write(path, **layers):
     """Writes an EXR file of layers with three components: X Y Z for `normal`, else R G B; `picture` is the root layer."""
@@ -61,7 +70,10 @@ def keep_best(values, counted):
 
 
 class Reference:
-    """Two independent halves of a reference, and errors of pictures against them."""
+    """Two independent halves of a reference, and errors of pictures against them, also inside glass and mirrors: of the
+    pixels `inside`, if there are any."""
+
+    inside = None
 
     def __init__(self, first, second):
         self.halves = [half.astype(float) for half in (first, second)]
@@ -90,15 +102,19 @@ class Reference:
         # trimming, the edges of lights dominate the grain.
         smooth = keep_best(np.square((first + second) / 2).mean(-1) * self.weight, counted)
         ratio, ratio_error = self._mean_ratio(picture, counted)
+        flips = self._flips(picture, counted)
+        inside = None if self.inside is None else self.inside[counted]
+        within = {"flip_inside": flips[inside], "grain_inside": rough[inside]} if np.any(inside) else {}
         return {
             "relmse": float(error[counted].mean()),
             "relmse_trimmed": float(error[counted][kept].mean()),
-            "flip": self._flip(picture, counted),
+            "flip": float(flips.mean()),
             "grain": float(rough.mean()),
             "grain_trimmed": float(rough[smooth].mean()),
             "mean_ratio": ratio,
             "mean_ratio_error": ratio_error,
             "pixels_not_finite": int((~counted).sum()),
+            **{name: float(values.mean()) for name, values in within.items()},
         }
 
     def _mean_ratio(self, picture, counted):
@@ -109,10 +125,10 @@ class Reference:
         squares = np.square(picture - self.mean).mean(-1)[counted]
         return float(picture[counted].mean() / whole), float(np.sqrt(squares.mean() / counted.sum()) / whole)
 
-    def _flip(self, picture, counted):
+    def _flips(self, picture, counted):
         show = [
             np.ascontiguousarray(np.where(counted[..., None], np.maximum(x, 0.0), 0.0), np.float32)
             for x in (self.mean, picture)
         ]
         flips = flip_evaluator.evaluate(*show, "HDR", inputsRGB=False, applyMagma=False)[0]
-        return float(np.asarray(flips)[counted].mean())
+        return np.asarray(flips).reshape(counted.shape)[counted]

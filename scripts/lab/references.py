@@ -6,6 +6,7 @@ reference.json names the program that rendered it.
 """
 
 import math
+from pathlib import Path
 
 from . import twins
 from .cache import CACHE, create, frame_suffix, load, outside, program, run_timed, save, scene_key
@@ -26,21 +27,24 @@ SETS = {"first": ["scenes"], "second": ["scenes/second"], "all": ["scenes", "sce
 
 
 def scenes():
-    """The paths of the selected scenes: those of --set, or those that --scenes names (NAME, second/NAME, twin/NAME)."""
+    """The paths of the selected scenes: those of --set, or those that --scenes names (NAME, second/NAME, twin/NAME,
+    PATH.glb)."""
     if options.set not in SETS:
         raise SystemExit(f"--set {options.set} is not one of {', '.join(SETS)}")
     if options.scenes:
         found = [path(name) for name in options.scenes]
         missing = [file for file in found if not file.exists()]
         if missing:
-            raise SystemExit(f"{missing[0]} does not exist: --scenes names files below scenes, without .glb")
+            raise SystemExit(f"{missing[0]} does not exist: --scenes names files below scenes, without .glb, or paths")
         return found
     found = [file for folder in SETS[options.set] or SETS["all"] for file in sorted((ROOT / folder).glob("*.glb"))]
     return found if options.set != "twins" else [file for file in map(twins.twin, found) if file]
 
 
 def path(text):
-    """The file of a scene, by the scene's name in tables."""
+    """The file of a scene, by its path or by the scene's name in tables."""
+    if text.endswith(".glb"):
+        return Path(text).resolve()
     if not text.startswith("twin/"):
         return ROOT / "scenes" / f"{text}.glb"
     originals = [ROOT / folder / f"{text[5:]}.glb" for folder in SETS["all"]]

@@ -25,6 +25,8 @@ from .record import ROOT
 
 # The interpreter that has OIDN (scripts/compare/setup.sh peers).
 PYTHON = installed(".venv-peers")
+# Iterations of the render that finds the pixels with glass and mirrors.
+INSIDE_ITERATIONS = 4
 # With --clock cpu, a render is repeated until its core-seconds are within this share of the budget, up to MAX_TRIES times.
 BUDGET_TOLERANCE, MAX_TRIES = 0.05, 4
 
@@ -90,6 +92,17 @@ def _render(scene, method, denoise, budget, seed, file, binary, frame):
     }
 
 
+def inside(scene):
+    """Which pixels of a scene show smooth glass or a mirror, by a short render that the cache keeps."""
+    folder = CACHE / "inside" / scene_key(scene) / str(options.width)
+    if not (folder / "inside.exr").exists():
+        with create(folder) as draft:
+            words = ["render", scene, "-o", draft / "inside.exr"]
+            settings = {"method": "path", "no_finish": True, "iterations": INSIDE_ITERATIONS, "width": options.width}
+            run_timed(command(*words, **settings, layers="beauty,CryptoMaterial", progress="none"))
+    return Layers(folder / "inside.exr").smooth()
+
+
 def denoise_file(folder, source, target):
     """Denoises a file of a folder by OIDN alone, unless the target exists; returns whether the target exists."""
     if not (folder / target).exists() and PYTHON:
@@ -120,7 +133,7 @@ def pictures(folder):
 def figures(folder, reference, halves, pictures_of):
     """The errors of a folder's pictures against a reference, from the cache if possible. `pictures_of(folder)` returns
     the pictures."""
-    file = folder / f"figures-{digest(halves / 'half1.exr', halves / 'half2.exr')}.json"
+    file = folder / f"errors-{digest(halves / 'half1.exr', halves / 'half2.exr')}.json"
     known = load(file) or {}
     if "oidn" not in known and PYTHON or not known:
         for name, picture in pictures_of(folder).items():

@@ -3,8 +3,11 @@
 use super::progress::Form;
 use super::{output, print, print_json};
 use caustique::error::{Error, ErrorKind, Result};
-use caustique::film::Layer;
-use caustique::image::{Comparison, Floor, Outputs, Windowed, atomic, compare_windows, exr, heat, png};
+use caustique::film::{Layer, LayerSet, Size};
+use caustique::image::window::check_sizes;
+use caustique::image::{
+    Comparison, Floor, Inside, Outputs, Windowed, atomic, compare_windows, exr, heat, png, smooth_pixels,
+};
 use caustique::report::errors;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -13,7 +16,8 @@ use std::path::{Path, PathBuf};
 ///
 /// relMSE is the mean over pixels of the squared difference over the squared reference plus 0.01; trimmed leaves out
 /// the worst 0.5 % of pixels. FLIP estimates the visible difference when one image replaces the other. Grain is the part
-/// of relMSE that neighbouring pixels do not share: the mean over 3 x 3 pixels is subtracted from the error.
+/// of relMSE that neighbouring pixels do not share: the mean over 3 x 3 pixels is subtracted from the error. The errors inside
+/// glass and mirrors are those of the pixels that show smooth glass or a mirror.
 #[derive(clap::Args)]
 pub struct CompareArgs {
     /// EXR to measure
@@ -29,6 +33,10 @@ pub struct CompareArgs {
     /// independent of the brightness of the lamps
     #[arg(long)]
     relative: bool,
+    /// EXR whose pixels show glass and mirrors, by its cryptomatte of materials, or where the first channel of LAYER is above
+    /// 0.5 [default: A.exr, else B.exr]
+    #[arg(long, value_name = "FILE[:LAYER]")]
+    mask: Option<PathBuf>,
     /// Also write a heat map of FLIP: black is no difference, pale yellow a large one
     #[arg(long, value_name = "FILE.png")]
     png: Option<PathBuf>,
@@ -50,12 +58,22 @@ pub fn run(args: &CompareArgs) -> Result<()> {
         output::check(page, "html")?;
     }
     let outputs = Outputs::new(args.png.iter().chain(&args.page).cloned())?;
-    outputs.check([args.image.as_path(), &args.reference])?;
-    let image = read(&args.image, args.layer.as_deref())?;
-    let reference = read(&args.reference, args.layer.as_deref())?;
+    outputs.check(
+        [args.image.as_path(), &args.reference].into_iter().chain(args.mask.as_deref().map(|mask| mask_parts(mask).0)),
+    )?;
+    let (image, of_image) = read(&args.image, args.layer.as_deref())?;
+    let (reference, of_reference) = read(&args.reference, args.layer.as_deref())?;
     let floor = if args.relative { Floor::Relative } else { Floor::Papers };
     let compared = Form::for_output(args.json).during("comparing", || compare_windows(&image, &reference, floor));
-    let (mut comparison, [image, reference]) = compared.map_err(|e| e.within(args.image.display()))?;
+    let (mut comparison, common) = compared.map_err(|e| e.within(args.image.display()))?;
+    let mask = args.mask.as_deref().map(|mask| read_mask(mask, image.whole)).transpose()?;
+    let of_mask = mask.as_ref().map(|(picture, inside)| (picture, inside));
+    let of_image = of_image.as_ref().map(|inside| (&image, inside));
+    let of_reference = of_reference.as_ref().map(|inside| (&reference, inside));
+    if let Some((picture, inside)) = of_mask.or(of_image).or(of_reference) {
+        comparison.measure_inside(&picture.values_in(&common[0], inside)?);
+    }
+    let [image, reference] = common;
     if let Some(path) = &args.png {
         let map = image.expand_values(&comparison.flip_map)?;
         png::write(path, image.whole, map.iter().map(|&error| heat::magma(error)))?;
@@ -70,20 +88,51 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     if args.json { print_json(&json!(comparison)) } else { print(&text(&comparison)) }
 }
 
-/// Reads the layers of an EXR. If a layer is named, it becomes the picture, without the other layers.
-fn read(path: &Path, layer: Option<&str>) -> Result<Windowed> {
-    let mut windowed = exr::read_window(path)?;
-    let set = &mut windowed.set;
+/// Reads the layers of an EXR, and which of its pixels show smooth glass or a mirror, if it says so. If a layer is named, it
+/// becomes the picture, without the other layers.
+fn read(path: &Path, layer: Option<&str>) -> Result<(Windowed, Option<Vec<bool>>)> {
+    let (mut windowed, attributes) = exr::read_window(path)?;
+    let inside = smooth_pixels(&windowed.set, &attributes);
     if let Some(name) = layer {
-        let names: Vec<String> = set.layers.iter().map(describe_layer).collect();
-        set.layers.retain(|layer| layer.name == name);
-        let Some(layer) = set.layers.first_mut() else {
-            let error = Error::new(ErrorKind::Usage, path.display(), format!("there is no layer \"{name}\""));
-            return Err(error.hint(format!("it has {}", names.join(", "))));
-        };
-        layer.name.clear();
+        name_picture(&mut windowed.set, path, name)?;
     }
-    Ok(windowed)
+    Ok((windowed, inside))
+}
+
+/// Makes the layer of this name the picture, and removes the other layers.
+fn name_picture(set: &mut LayerSet, path: &Path, name: &str) -> Result<()> {
+    let names: Vec<String> = set.layers.iter().map(describe_layer).collect();
+    set.layers.retain(|layer| layer.name == name);
+    let Some(layer) = set.layers.first_mut() else {
+        let error = Error::new(ErrorKind::Usage, path.display(), format!("there is no layer \"{name}\""));
+        return Err(error.hint(format!("it has {}", names.join(", "))));
+    };
+    layer.name.clear();
+    Ok(())
+}
+
+/// The file and the layer of the argument of --mask, `FILE` or `FILE:LAYER`.
+fn mask_parts(argument: &Path) -> (&Path, Option<&str>) {
+    let named = argument.to_str().filter(|_| !argument.exists()).and_then(|text| text.rsplit_once(':'));
+    named.map_or((argument, None), |(file, layer)| (Path::new(file), Some(layer)))
+}
+
+/// Reads the argument of --mask, for a picture of this size.
+fn read_mask(argument: &Path, whole: Size) -> Result<(Windowed, Vec<bool>)> {
+    let (path, layer) = mask_parts(argument);
+    let fault = |cause: &str| Error::new(ErrorKind::Usage, path.display(), cause);
+    let (mask, smooth) = read(path, layer)?;
+    check_sizes(mask.whole, whole).map_err(|e| e.within(path.display()))?;
+    let first = mask.set.get("").and_then(|layer| layer.planes.first());
+    let inside = match (layer, first) {
+        (Some(_), Some(plane)) => plane.values.iter().map(|value| *value > 0.5).collect(),
+        (Some(_), None) => return Err(fault("its layer is empty")),
+        (None, _) => smooth.ok_or_else(|| {
+            let error = fault("it does not say which pixels show glass and mirrors");
+            error.hint("render it with --layers that include CryptoMaterial, or name a layer: FILE:LAYER")
+        })?,
+    };
+    Ok((mask, inside))
 }
 
 /// The name of a layer for messages, or the channels of the beauty layer, which has no name.
@@ -94,7 +143,7 @@ fn describe_layer(layer: &Layer) -> String {
 
 fn text(comparison: &Comparison) -> String {
     let ratio = comparison.mean_ratio.map_or("the reference is black".into(), |ratio| format!("{ratio:.6}"));
-    format!(
+    let whole = format!(
         "relMSE            {:.6e}\nrelMSE, trimmed   {:.6e}\nMSE               {:.6e}\nmean ratio        {ratio}\n\
          FLIP              {:.6}\ngrain             {:.6e}\npixels not finite {}\n",
         comparison.relmse,
@@ -103,5 +152,12 @@ fn text(comparison: &Comparison) -> String {
         comparison.flip,
         comparison.grain,
         comparison.pixels_not_finite
-    )
+    );
+    let inside = comparison.inside.map_or_else(String::new, |Inside { pixels, relmse, flip, grain }| {
+        format!(
+            "in glass and mirrors, {pixels} pixels:\n  relMSE          {relmse:.6e}\n  FLIP            {flip:.6}\n  \
+             grain           {grain:.6e}\n"
+        )
+    });
+    whole + &inside
 }

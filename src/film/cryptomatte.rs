@@ -4,8 +4,8 @@
 //! 2015, and the Cryptomatte specification 1.2.0 (github.com/Psyop/Cryptomatte). An id is the hash of a name, stored as
 //! the float of the same bits; two ranks (id, coverage) fit into the four channels of a layer, largest coverage first.
 
-use super::layers::{Layer, Plane, Sample};
-use super::naming::Naming;
+use super::layers::{Layer, LayerSet, Plane, Sample};
+use super::naming::{Naming, plain_name};
 
 /// Number of ranks, pairs of an object's id and its coverage, per pixel; each layer stores two.
 pub const RANKS: usize = 6;
@@ -89,6 +89,27 @@ impl Cryptomatte {
         };
         (0..RANKS / 2).map(layer).collect()
     }
+}
+
+/// The share of each pixel, 0 to 1, that the objects or materials of these names cover, by the cryptomatte layers of a
+/// file; `None` without such layers. `kind` is their prefix, as of [`Cryptomatte::new`].
+pub fn coverage<'a>(set: &LayerSet, kind: &str, names: impl IntoIterator<Item = &'a str>) -> Option<Vec<f32>> {
+    let ids: Vec<u32> = names.into_iter().map(|name| Id::of(name).0).collect();
+    let is_rank = |layer: &&Layer| {
+        let number = plain_name(&layer.name).strip_prefix(kind).filter(|number| !number.is_empty());
+        number.is_some_and(|number| number.bytes().all(|digit| digit.is_ascii_digit()))
+    };
+    let mut covered: Option<Vec<f32>> = None;
+    for layer in set.layers.iter().filter(is_rank) {
+        let covered = covered.get_or_insert_with(|| vec![0.0; set.pixels()]);
+        for [id, share] in [["r", "g"], ["b", "a"]] {
+            let (Some(id), Some(share)) = (layer.plane(id), layer.plane(share)) else { continue };
+            for ((covered, id), share) in covered.iter_mut().zip(&id.values).zip(&share.values) {
+                *covered += if ids.contains(&id.to_bits()) { *share } else { 0.0 };
+            }
+        }
+    }
+    covered
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -30,9 +30,43 @@ pub struct Comparison {
     pub floor: f64,
     /// Number of pixels with a channel that is not finite, in either picture.
     pub pixels_not_finite: u64,
+    /// The errors of the pixels that show smooth glass or a mirror; `None` until [`Comparison::measure_inside`] finds some.
+    pub inside: Option<Inside>,
     /// HDR-FLIP per pixel, rows from the top; 1 where a pixel is not finite.
     #[serde(skip)]
     pub flip_map: Vec<f32>,
+    /// Relative squared error and grain per pixel; NaN where a pixel is not finite.
+    #[serde(skip)]
+    error_maps: [Vec<f64>; 2],
+}
+
+/// The errors of some of the pixels. Serialises as `compare --json` prints it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Inside {
+    /// Number of these pixels that are finite in both pictures.
+    pub pixels: u64,
+    /// Mean relative squared error, see [`Comparison::relmse`].
+    pub relmse: f64,
+    /// Mean of HDR-FLIP, see [`Comparison::flip`].
+    pub flip: f64,
+    /// Mean of the grain, see [`Comparison::grain`].
+    pub grain: f64,
+}
+
+impl Comparison {
+    /// Measures the errors of the pixels for which `inside`, with one value per pixel, is true.
+    pub fn measure_inside(&mut self, inside: &[bool]) {
+        let [relative, grain] = &self.error_maps;
+        let pixels: Vec<usize> =
+            (0..inside.len().min(grain.len())).filter(|&i| inside[i] && !grain[i].is_nan()).collect();
+        let mean = |value: &dyn Fn(usize) -> f64| pixels.iter().map(|&i| value(i)).sum::<f64>() / pixels.len() as f64;
+        self.inside = (!pixels.is_empty()).then(|| Inside {
+            pixels: pixels.len() as u64,
+            relmse: mean(&|i| relative[i]),
+            flip: mean(&|i| f64::from(self.flip_map[i])),
+            grain: mean(&|i| grain[i]),
+        });
+    }
 }
 
 /// The constant that is added to the squared reference, to which errors are relative.
@@ -120,21 +154,25 @@ pub fn squared_error(x: [f32; 3], r: [f32; 3]) -> f64 {
 /// offset nothing. Pixels that are not finite in both pictures are left out, also of windows. `None` if no other pixel
 /// exists, or if the sizes differ.
 pub fn grain(a: &Picture, b: &Picture) -> Option<f64> {
-    grain_with_floor(a, b, floor::ABSOLUTE, 0)
+    (a.size() == b.size()).then(|| mean_of_known(&grain_map(a, b, floor::ABSOLUTE), 0))?
 }
 
-/// `outside`: number of pixels around both pictures that are black in both.
-fn grain_with_floor(a: &Picture, b: &Picture, floor: f64, outside: usize) -> Option<f64> {
-    if a.size() != b.size() {
-        return None;
-    }
+/// The mean of the values that are not NaN, and of `zeros` others; `None` if there is no value.
+fn mean_of_known(values: &[f64], zeros: usize) -> Option<f64> {
+    let known = || values.iter().filter(|value| !value.is_nan());
+    let count = known().count() + zeros;
+    (count > 0).then(|| known().sum::<f64>() / count as f64)
+}
+
+/// The grain of each pixel of pictures of equal size, see [`grain`]; NaN where a pixel is not finite in both.
+fn grain_map(a: &Picture, b: &Picture, floor: f64) -> Vec<f64> {
     let Size { width, height } = a.size();
     let finite = |i: usize| a[i].iter().chain(&b[i]).all(|v| v.is_finite());
     let error = |i: usize| -> Option<[f64; 3]> {
         finite(i).then(|| std::array::from_fn(|c| f64::from(a[i][c]) - f64::from(b[i][c])))
     };
     let errors: Vec<Option<[f64; 3]>> = (0..a.len()).map(error).collect();
-    let (mut sum, mut pixels) = (0.0, outside);
+    let mut found = vec![f64::NAN; a.len()];
     for y in 0..height {
         for x in 0..width {
             let i = y * width + x;
@@ -149,11 +187,10 @@ fn grain_with_floor(a: &Picture, b: &Picture, floor: f64, outside: usize) -> Opt
                 }
             }
             let square = (0..3).map(|c| (own[c] - around[c] / count).powi(2)).sum::<f64>() / 3.0;
-            sum += square / weight(b[i], floor);
-            pixels += 1;
+            found[i] = square / weight(b[i], floor);
         }
     }
-    (pixels > 0).then(|| sum / pixels as f64)
+    found
 }
 
 /// Compares the pictures (see [`LayerSet::beauty`]) of two files, with the papers' floor; `b` is the reference.
@@ -198,8 +235,8 @@ fn check_memory(Size { width, height }: Size) -> Result<()> {
 }
 
 /// Bytes of memory per pixel while two pictures are compared, besides the layers of the files: two pictures, two
-/// exposed copies of them, and the buffers of FLIP.
-const COMPARED_PIXEL_BYTES: u64 = 200;
+/// exposed copies of them, the buffers of FLIP, and maps of errors.
+const COMPARED_PIXEL_BYTES: u64 = 216;
 
 /// Compares the scene-linear picture `a` with the reference `b`, see [`compare`]. `outside`: number of pixels around both
 /// that are black in both.
@@ -211,8 +248,9 @@ pub fn compare_pictures(a: &Picture, b: &Picture, floor: Floor, outside: usize) 
     let finite = |i: usize| a[i].iter().chain(&b[i]).all(|v| v.is_finite());
     let pixels: Vec<usize> = (0..a.len()).filter(|&i| finite(i)).collect();
     let floor = floor.of(b, outside);
+    let grains = grain_map(a, b, floor);
     let (Some(Errors { relmse, relmse_trimmed, mse, mean_ratio }), Some(grain)) =
-        (errors_with_floor(a, b, floor, outside), grain_with_floor(a, b, floor, outside))
+        (errors_with_floor(a, b, floor, outside), mean_of_known(&grains, outside))
     else {
         return Err(Error::new(ErrorKind::Image, "", "the pictures have no pixel with finite values in common"));
     };
@@ -231,6 +269,8 @@ pub fn compare_pictures(a: &Picture, b: &Picture, floor: Floor, outside: usize) 
         grain,
         floor,
         pixels_not_finite: (a.len() - pixels.len()) as u64,
+        inside: None,
         flip_map,
+        error_maps: [(0..a.len()).map(|i| squared_error(a[i], b[i]) / weight(b[i], floor)).collect(), grains],
     })
 }

@@ -5,6 +5,7 @@ pub mod exr;
 mod filmic;
 pub mod flip;
 pub mod heat;
+pub mod inside;
 pub mod metrics;
 pub mod outputs;
 pub mod png;
@@ -12,8 +13,9 @@ pub mod tonemap;
 pub mod usd_layer;
 pub mod window;
 
+pub use inside::{SMOOTH_MATERIALS, smooth_pixels};
 pub use metrics::{
-    Comparison, Errors, Floor, compare, compare_windows, compare_with_floor, errors, relative_squared_error,
+    Comparison, Errors, Floor, Inside, compare, compare_windows, compare_with_floor, errors, relative_squared_error,
 };
 pub use outputs::Outputs;
 pub use window::Windowed;

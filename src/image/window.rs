@@ -49,6 +49,14 @@ impl Windowed {
         self.moved(values, [0, 0], self.whole)
     }
 
+    /// The values of a plane of this window in another window of the picture; 0 or false where this window has none.
+    ///
+    /// # Errors
+    /// There is too little memory.
+    pub fn values_in<T: Copy + Default>(&self, other: &Windowed, values: &[T]) -> Result<Vec<T>> {
+        self.moved(values, other.corner, other.set.size())
+    }
+
     /// The picture in a window that holds this one.
     fn in_window(&self, corner: [usize; 2], size: Size) -> Result<Windowed> {
         let mut set = LayerSet::new(size.width, size.height);
@@ -63,16 +71,22 @@ impl Windowed {
         Ok(Windowed { set, whole: self.whole, corner })
     }
 
-    fn moved(&self, values: &[f32], corner: [usize; 2], size: Size) -> Result<Vec<f32>> {
+    fn moved<T: Copy + Default>(&self, values: &[T], corner: [usize; 2], size: Size) -> Result<Vec<T>> {
         let pixels = size.width.saturating_mul(size.height);
-        memory::require(4 * pixels as u64, format_args!("{} x {} pixels", size.width, size.height))?;
-        let mut out = vec![0.0; pixels];
-        let [left, top] = [0, 1].map(|axis| self.corner[axis].saturating_sub(corner[axis]));
-        for (row, line) in values.chunks_exact(self.set.width.max(1)).enumerate() {
-            let start = (top + row) * size.width + left;
-            if let Some(place) = out.get_mut(start..start + line.len()) {
-                place.copy_from_slice(line);
-            }
+        memory::require((size_of::<T>() * pixels) as u64, format_args!("{} x {} pixels", size.width, size.height))?;
+        let mut out = vec![T::default(); pixels];
+        let own = self.set.size();
+        // The columns and the rows that both windows have.
+        let shared = |axis: usize, ours: usize, theirs: usize| {
+            self.corner[axis].max(corner[axis])..(self.corner[axis] + ours).min(corner[axis] + theirs)
+        };
+        let (columns, rows) = (shared(0, own.width, size.width), shared(1, own.height, size.height));
+        for y in rows.filter(|_| !columns.is_empty()) {
+            let line = |corner: [usize; 2], width: usize| {
+                let start = (y - corner[1]) * width + columns.start - corner[0];
+                start..start + columns.len()
+            };
+            out[line(corner, size.width)].copy_from_slice(&values[line(self.corner, own.width)]);
         }
         Ok(out)
     }

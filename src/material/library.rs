@@ -101,9 +101,22 @@ impl Material {
 
     /// Whether the base, without coats, may have a narrow lobe (delta or sharp).
     fn has_narrow_base(&self) -> bool {
+        self.is_narrow() || self.metallic_roughness_texture.is_some()
+    }
+
+    /// Whether the lobe of the base is narrow (delta or sharp) everywhere: a texture can only make it narrower.
+    fn is_narrow(&self) -> bool {
         let glass = self.transmission > 0.0 && !self.thin;
         let width = if glass { refraction_width(self.ior) } else { 1.0 };
-        self.roughness * width.sqrt() < MAX_FOCUSING_ROUGHNESS || self.metallic_roughness_texture.is_some()
+        self.roughness * width.sqrt() < MAX_FOCUSING_ROUGHNESS
+    }
+
+    /// Whether the material is glass or a mirror, perfect or slightly rough, everywhere: it shows what is behind it or in
+    /// front of it.
+    pub fn is_smooth(&self) -> bool {
+        let glass = self.transmission >= 0.5 && self.transmission_texture.is_none();
+        let metal = self.metallic >= 0.5 && self.metallic_roughness_texture.is_none();
+        self.is_narrow() && (glass || metal)
     }
 
     /// Whether the material shows reflections: its base or its clear coat may have a narrow lobe (delta or sharp).

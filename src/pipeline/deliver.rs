@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 use crate::estimator::PixelAccumulator;
 use crate::film::{Layer, LayerSet, MOTION, Naming, Selection};
 use crate::finish::{ERROR, Finished, FinishedError, reads};
+use crate::image::SMOOTH_MATERIALS;
 use crate::image::exr::{self, Attributes};
 use crate::render::{Accuracy, CONFIDENCE, Clock, HistoryEntry, Rendered, TechniquePicture, cpu_seconds, peak_memory};
 use serde_json::{Map, Value, json};
@@ -144,6 +145,7 @@ impl Contents<'_> {
         header.insert("plan".into(), self.plan.clone());
         header.insert("arguments".into(), self.arguments.clone());
         header.insert("warnings".into(), json!(warnings));
+        header.insert(SMOOTH_MATERIALS.into(), json!(self.facts.names.smooth));
         header.extend(self.facts.made_for.frame.map(|frame| ("frame".to_owned(), frame.into())));
         header.extend(self.facts.made_for.frame_rate.map(|rate| ("frame_rate".to_owned(), json!(rate))));
         header.extend(self.facts.made_for.exposure.map(|exposure| ("exposure".to_owned(), json!(exposure))));

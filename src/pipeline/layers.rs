@@ -86,12 +86,16 @@ pub(super) struct SceneNames {
     pub materials: Vec<String>,
     /// Indices of the object and the material of each instance in the scene.
     pub instances: Vec<[u32; 2]>,
+    /// Names of the materials that are smooth glass or mirrors, see [`crate::material::Material::is_smooth`].
+    pub smooth: Vec<String>,
 }
 
 impl SceneNames {
     /// Collects the names of a scene's objects and materials.
     pub fn of(scene: &Scene) -> SceneNames {
+        let smooth = scene.materials.list.iter().filter(|material| material.is_smooth());
         SceneNames {
+            smooth: smooth.map(|material| material.name.clone()).collect(),
             objects: scene.objects.clone(),
             materials: scene.materials.list.iter().map(|material| material.name.clone()).collect(),
             instances: scene.shapes.instances.iter().map(|instance| [instance.object, instance.material]).collect(),

@@ -49,11 +49,16 @@ pub fn html(image: &LayerSet, reference: &LayerSet, names: [&str; 2], comparison
         figures.push(figure("error that the render has estimated", &estimated, Some((&bar, &percents(largest)))));
     }
     figures.push(figure("FLIP", &data_url(&map(&comparison.flip_map, 1.0)?), Some((&bar, &plain))));
+    let inside = comparison.inside.map_or_else(String::new, |inside| {
+        let [relmse, flip, grain] = [inside.relmse, inside.flip, inside.grain].map(short);
+        format!("; in glass and mirrors relMSE {relmse}, FLIP {flip}, grain {grain}")
+    });
     let lead = format!(
-        "relMSE {}, trimmed {}, FLIP {}, mean ratio {}",
+        "relMSE {}, trimmed {}, FLIP {}, grain {}, mean ratio {}{inside}",
         short(comparison.relmse),
         short(comparison.relmse_trimmed),
         short(comparison.flip),
+        short(comparison.grain),
         comparison.mean_ratio.map_or("unknown".into(), short)
     );
     let body = html! { section { div.errors { @for figure in &figures { (figure) } } } };

@@ -1,10 +1,13 @@
 //! Compares error metrics with closed forms and with the reference implementation of FLIP, and tone curves with
 //! published values.
 
-use caustique::film::{Layer, LayerSet, Picture, Size};
+use caustique::film::cryptomatte::{Cryptomatte, PixelRanks};
+use caustique::film::{CRYPTOMATTES, Layer, LayerSet, Picture, Size};
 use caustique::image::exr::{self, Attributes, Frame};
 use caustique::image::tonemap::{Contrast, Look, ToneMap, srgb_decode};
-use caustique::image::{Floor, compare, compare_windows, compare_with_floor, flip, heat, metrics};
+use caustique::image::{
+    Floor, SMOOTH_MATERIALS, compare, compare_windows, compare_with_floor, flip, heat, metrics, smooth_pixels,
+};
 use caustique::math::Rgb;
 
 const WIDTH: usize = 96;
@@ -188,11 +191,49 @@ fn incomparable_pictures_are_an_error() {
 }
 
 #[test]
+fn the_errors_inside_glass_are_those_of_the_pixels_with_smooth_materials() {
+    let (width, height) = (6, 4);
+    // Glass covers the left third, and a seventh of the next pixel of each row.
+    let mattes = Cryptomatte::new(CRYPTOMATTES[1], ["wall", "glass"].map(String::from));
+    let ranks: Vec<PixelRanks> = (0..width * height)
+        .map(|i| {
+            let mut ranks = PixelRanks::default();
+            let glass = [1.0, 0.75, 0.125, 0.0, 0.0, 0.0][i % width];
+            [(1, glass), (0, 1.0 - glass)].iter().filter(|(_, share)| *share > 0.0).for_each(|&(material, share)| {
+                ranks.add(mattes.ids()[material], share);
+            });
+            ranks
+        })
+        .collect();
+    let b = picture(width, height, |_| [1.0; 3]);
+    let mut a =
+        picture(width, height, |i| if i == 0 { [f32::NAN; 3] } else { [if i % width < 2 { 1.3 } else { 2.0 }; 3] });
+    mattes.layers(&ranks, 1.0).into_iter().for_each(|layer| a.push(layer).unwrap());
+    let header = |names: &[&str]| Attributes::of(&serde_json::json!({SMOOTH_MATERIALS: names})).unwrap();
+    let inside = smooth_pixels(&a, &header(&["glass"])).unwrap();
+    assert!((0..width * height).all(|i| inside[i] == (i % width < 2)));
+    let mut result = compare(&a, &b).unwrap();
+    result.measure_inside(&inside);
+    let found = result.inside.unwrap();
+    assert_eq!(found.pixels, 7);
+    assert!((found.relmse - 0.09 / 1.01).abs() < 1e-6, "{}", found.relmse);
+    let flips = (1..width * height).filter(|i| i % width < 2).map(|i| f64::from(result.flip_map[i]));
+    assert!(found.flip > 0.0 && (found.flip - flips.sum::<f64>() / 7.0).abs() < 1e-9);
+    assert!(found.grain > 0.0);
+    // Without such materials there are no such pixels, and without their names nothing is known.
+    result.measure_inside(&smooth_pixels(&a, &header(&[])).unwrap());
+    assert_eq!(result.inside, None);
+    assert_eq!(smooth_pixels(&a, &Attributes::default()), None);
+    assert_eq!(smooth_pixels(&b, &header(&["glass"])), None);
+}
+
+#[test]
 fn the_json_has_the_promised_keys() {
     let b = picture(2, 2, |_| [0.0; 3]);
     let json = serde_json::to_value(compare(&b, &b).unwrap()).unwrap();
     let keys: Vec<&str> = json.as_object().unwrap().keys().map(String::as_str).collect();
-    let mut expected = ["relmse", "relmse_trimmed", "mse", "mean_ratio", "flip", "grain", "floor", "pixels_not_finite"];
+    let mut expected =
+        ["relmse", "relmse_trimmed", "mse", "mean_ratio", "flip", "grain", "floor", "pixels_not_finite", "inside"];
     expected.sort_unstable();
     let mut found = keys.clone();
     found.sort_unstable();
@@ -350,7 +391,7 @@ fn windows_have_the_errors_of_whole_pictures() {
     };
     for (whole, [one, other]) in [([140, 100], [[7, 5], [40, 30]]), ([96, 150], [[0, 40], [0, 86]])] {
         let paths = [write("a.exr", &test, whole, one), write("b.exr", &reference, whole, other)];
-        let [a, b] = paths.each_ref().map(|path| exr::read_window(path).expect("it can be read"));
+        let [a, b] = paths.each_ref().map(|path| exr::read_window(path).expect("it can be read").0);
         let [c, d] = paths.each_ref().map(|path| exr::read(path).expect("it can be read").0);
         assert_eq!((a.set.size(), a.expand().expect("there is memory")), (SIZE, c.clone()));
         for floor in [Floor::Papers, Floor::Relative] {
@@ -373,7 +414,7 @@ fn windows_have_the_errors_of_whole_pictures() {
     }
     // A display window of a million rows costs nothing.
     let paths = [write("a.exr", &test, [96, 1 << 20], [0, 5]), write("b.exr", &reference, [96, 1 << 20], [0, 9])];
-    let [a, b] = paths.each_ref().map(|path| exr::read_window(path).expect("it can be read"));
+    let [a, b] = paths.each_ref().map(|path| exr::read_window(path).expect("it can be read").0);
     let (_, [joined, _]) = compare_windows(&a, &b, Floor::Papers).expect("they can be compared");
     assert_eq!((a.set.size(), joined.set.size().height), (SIZE, 9 + HEIGHT + 16));
 }

@@ -62,6 +62,26 @@ class Errors(unittest.TestCase):
             self.assertAlmostEqual(found[key] / said[key], 1, delta=1e-5, msg=key)
         self.assertAlmostEqual(found["flip"] / said["flip"], 1, delta=2e-2)
 
+    def test_errors_inside_glass_and_mirrors_equal_those_of_the_program(self):
+        with tempfile.TemporaryDirectory() as folder:
+            paths = [Path(folder) / name for name in ("a.exr", "b.exr")]
+            for seed, path in enumerate(paths):
+                words = ["render", SCENES / "cornell.glb", "-o", path, "--width", 24, "--method", "path"]
+                support.run([*words, "--iterations", 2, "--no-finish", "--seed", seed], check=0)
+            said = json.loads(support.run(["compare", *paths, "--json"]).stdout)
+            masked = ["compare", *paths, "--json", "--layer", "albedo", "--mask"]
+            by_layer = json.loads(support.run([*masked, f"{paths[0]}:Z"]).stdout)
+            fault = support.run([*masked, f"{paths[0]}:nothing"], check=2).stderr
+            picture, truth = map(picture_errors.Layers, paths)
+        self.assertIn('no layer "nothing"', fault)
+        self.assertEqual(by_layer["inside"]["pixels"], int((picture.channels["Z"] > 0.5).sum()))
+        reference = picture_errors.Reference(truth.get(""), truth.get(""))
+        reference.inside = picture.smooth()
+        self.assertTrue(0 < reference.inside.sum() == said["inside"]["pixels"] < reference.inside.size / 2)
+        found = reference.measure(picture.get(""))
+        self.assertAlmostEqual(found["grain_inside"] / said["inside"]["grain"], 1, delta=1e-5)
+        self.assertAlmostEqual(found["flip_inside"] / said["inside"]["flip"], 1, delta=5e-2)
+
 
 class Goals(unittest.TestCase):
     def test_ratios_are_counted(self):

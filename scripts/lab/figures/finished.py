@@ -2,8 +2,8 @@
 with OIDN.
 
 Every picture is compared with two independent halves of a reference, so that the reference's own noise cancels: relMSE
-of all pixels and without the worst 0.5 %, HDR-FLIP (which includes the noise of the reference), and grain (see
-`caustique compare`) of all pixels and without the worst 0.5 %. Renders are cached, so an interrupted run continues.
+of all pixels and without the worst 0.5 %, HDR-FLIP (which includes the noise of the reference), grain (see
+`caustique compare`) of all pixels and without the worst 0.5 %, and FLIP and grain inside glass and mirrors. Renders are cached, so an interrupted run continues.
 
 CAUSTIQUE_BIN names the program, and CAUSTIQUE_CACHE the cache (by default caustique/finished in the user's cache).
 
@@ -37,7 +37,8 @@ SHORT = {"width": 240, "budgets": [10.0], "methods": ["auto", "path", "bdpt", "s
 # Renders with --clock wall that used a smaller share of their cores get a note.
 MIN_CORE_SHARE = 0.8
 KINDS = {"second": "second", "twin": "twins"}
-COLUMNS = f"{'':<36}{'core-s':>8}{'relMSE':>11}{'trimmed':>11}{'FLIP':>9}{'grain':>11}{'trimmed':>11}{'mean':>8}"
+COLUMNS = f"{'':<36}{'core-s':>8}{'relMSE':>11}{'trimmed':>11}{'FLIP':>9}{'grain':>11}{'trimmed':>11}"
+COLUMNS += f"{'inside:':>8}{'FLIP':>9}{'grain':>11}{'mean':>8}"
 
 
 def denoisers():
@@ -57,7 +58,12 @@ def mean(runs):
 
 def line(label, spent, figures, note=""):
     """Prints a row of the table."""
-    values = "".join(f"{figures[key]:>9.4f}" if key == "flip" else f"{figures[key]:>11.3g}" for key in FIGURES)
+
+    def value(key):
+        width = 11 if "grain" in key or "relmse" in key else 17 if key == "flip_inside" else 9
+        return f"{figures[key]:>{width}.{'4f' if key.startswith('flip') else '3g'}}" if key in figures else " " * width
+
+    values = "".join(map(value, FIGURES))
     values += f"{figures.get('mean_ratio', 1):>8.3f}"
     print(f"    {label:<32}{spent:>8.1f}{values}{'  ' + note if note else ''}", flush=True)
 
@@ -137,11 +143,14 @@ def others(peers, names, budget, reference, halves, cell):
 
 
 def short(cell):
-    """A cell for the record, with the errors to four digits."""
+    """A cell for the record, with the errors to four digits, None where they are unknown."""
+
+    def digits(error):
+        return None if error is None else float(f"{error:.4g}")
 
     def pictures(some):
         return {
-            name: {picture: [float(f"{figures[key]:.4g}") for key in FIGURES] for picture, figures in found.items()}
+            name: {picture: [digits(figures.get(key)) for key in FIGURES] for picture, figures in found.items()}
             for name, found in some.items()
         }
 
@@ -153,6 +162,7 @@ def measure(scene, names):
     """Measures a scene; returns a cell for each budget, and the facts of its reference."""
     halves, made = references.reference(scene)
     reference = Reference.read(halves)
+    reference.inside = renders.inside(scene)
     known = {"error": reference.error, **{key: made[key] for key in ("options", "core_seconds", "program")}}
     peers = peer_runs.Peers(scene, reference.mean.shape[0]) if names else None
     cells = []

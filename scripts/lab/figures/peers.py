@@ -1,8 +1,13 @@
 """Finished pictures at equal time beside Mitsuba, LuxCore and Cycles with OIDN, in one run, and the pictures of
 docs/gallery.md: ours, the best of each renderer by trimmed relMSE, and the reference.
 
-Only the first of the budgets counts. The budget of other renderers excludes their start-up (reading, compiling kernels,
-building caches). Ours includes everything except reading the scene.
+With several budgets, the pictures are those of the first. The errors inside glass and mirrors at 5, 20 and 60
+core-seconds, also of scenes outside the repository:
+
+    scripts/lab.sh peers --scenes second/still,second/vitrine,second/cosmetics,second/bath,PATH.glb --budgets 2.5,10,30
+
+The budget of other renderers excludes their start-up (reading, compiling kernels, building caches). Ours includes
+everything except reading the scene.
 """
 
 import sys
@@ -23,7 +28,7 @@ ARGUMENTS = finished.ARGUMENTS | {"set": "all", "budgets": [6.0], "methods": ["a
 GALLERY = ROOT / "docs" / "gallery"
 # The width of a picture in a strip, and the quantile of its brightness that is shown as white.
 SHOWN, WHITE = 240, 0.97
-COMPARED = ("relmse_trimmed", "flip", "grain_trimmed")
+COMPARED = ("relmse", "relmse_trimmed", "flip", "grain_trimmed", "flip_inside", "grain_inside")
 RENDERERS = {"mitsuba": "Mitsuba", "lux": "LuxCore", "cycles": "Cycles"}
 
 
@@ -56,30 +61,33 @@ def pictures(scene, peers, cell, halves):
     return [*found, halves.mean.astype(np.float32)], [*names, "reference"]
 
 
-def compare(scene, names):
-    """Compares the renderers on a scene, and writes its strip; returns the row."""
+def compare(scene, names, budget):
+    """Compares the renderers on a scene at a budget, and writes its strip at the first budget; returns the row."""
     halves, made = references.reference(scene)
     reference = Reference.read(halves)
+    reference.inside = renders.inside(scene)
     peers = peer_runs.Peers(scene, reference.mean.shape[0])
-    cell = finished.new_cell(scene, options.budgets[0], reference)
-    print(f"\n{cell['scene']}\n{finished.COLUMNS}", flush=True)
-    finished.ours(scene, options.budgets[0], reference, halves, cell)
-    finished.others(peers, names, options.budgets[0], reference, halves, cell)
+    cell = finished.new_cell(scene, budget, reference)
+    print(f"\n{cell['scene']}, {budget:g} s\n{finished.COLUMNS}", flush=True)
+    finished.ours(scene, budget, reference, halves, cell)
+    finished.others(peers, names, budget, reference, halves, cell)
     ours = cell["ours"]["auto"]["delivered"]
     theirs = {peer: made["oidn"] for peer, made in cell["peers"].items() if "oidn" in made}
     ratios = {
-        peer: {key: max(ours[key], 1e-9) / max(figures[key], 1e-9) for key in COMPARED}
+        peer: {key: max(ours[key], 1e-9) / max(figures[key], 1e-9) for key in COMPARED if key in ours}
         for peer, figures in theirs.items()
     }
     shown, titles = pictures(scene, peers, cell, reference)
-    if cell["core_seconds"].keys() - {"auto"}:  # another renderer has a picture
+    if budget == options.budgets[0] and cell["core_seconds"].keys() - {"auto"}:  # another renderer has a picture
         strip(cell["scene"], shown)
     figures = {"auto": ours, **theirs}
     return {
         "scene": cell["scene"],
         "reference": made["options"][1],
         "titles": titles,
-        "figures": {peer: [float(f"{of[key]:.4g}") for key in COMPARED] for peer, of in figures.items()},
+        "figures": {
+            peer: [float(f"{of[key]:.4g}") if key in of else None for key in COMPARED] for peer, of in figures.items()
+        },
         "ratios": {peer: {key: round(value, 3) for key, value in of.items()} for peer, of in ratios.items()},
         "core_seconds": {peer: round(spent, 1) for peer, spent in cell["core_seconds"].items()},
         "notes": cell["notes"],
@@ -93,11 +101,10 @@ def summary(rows):
     peers = list(dict.fromkeys(peer for row in rows for peer in row["ratios"]))
     for peer in [*peers, "best of all"]:
         for key in COMPARED:
-            values = [
-                max(of[key] for of in row["ratios"].values()) if peer == "best of all" else row["ratios"][peer][key]
-                for row in rows
-                if row["ratios"] and (peer == "best of all" or peer in row["ratios"])
-            ]
+            # Scenes without glass and mirrors have no errors inside.
+            known = [{name: of[key] for name, of in row["ratios"].items() if key in of} for row in rows]
+            best = [max(of.values()) for of in known if of]
+            values = best if peer == "best of all" else [of[peer] for of in known if peer in of]
             if values:
                 better = sum(value < 1 for value in values)
                 of = found.setdefault(peer, {})
@@ -109,19 +116,25 @@ def main():
     names, reason = peer_runs.select()
     if reason:
         sys.exit(f"peers: error: {reason}")
+    budgets = [measure(names, budget) for budget in options.budgets]
+    settings = {"program": program(), **{key: getattr(options, key) for key in ("width", "threads", "clock")}}
+    if options.set == "twins":
+        settings["set"] = "twins"
+    more = {"later_budgets": budgets[1:]} if budgets[1:] else {}
+    record("peers", {**settings, "compared": list(COMPARED), "all_figures": FIGURES, **budgets[0], **more})
+
+
+def measure(names, budget):
+    """Compares the renderers at a budget on all scenes, and prints our errors over theirs; returns the figures."""
     rows = []
     for scene in references.scenes():
         try:
-            rows.append(compare(scene, names))
+            rows.append(compare(scene, names, budget))
         except Failed as failed:
             print(f"\n{references.name(scene)}: {failed}", flush=True)
     found = summary(rows)
-    print(f"\n{'ours over':<22}{'':<16}{'geometric mean':>15}{'worst':>8}{'better':>9}")
+    print(f"\n{f'{budget:g} s, ours over':<22}{'':<16}{'geometric mean':>15}{'worst':>8}{'better':>9}")
     for peer, of in found.items():
         for key, (mean, worst, better, count) in of.items():
             print(f"{peer:<22}{key:<16}{mean:>15.3f}{worst:>8.2f}{better:>6}/{count}")
-    settings = {"program": program(), **{key: getattr(options, key) for key in ("width", "threads", "clock")}}
-    settings["seconds"] = options.budgets[0]
-    if options.set == "twins":
-        settings["set"] = "twins"
-    record("peers", {**settings, "compared": list(COMPARED), "all_figures": FIGURES, "summary": found, "rows": rows})
+    return {"seconds": budget, "summary": found, "rows": rows}

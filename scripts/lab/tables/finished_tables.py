@@ -12,7 +12,8 @@ GOALS = {
 # The `auto` of the program that --before names.
 BEFORE = "auto before"
 AUTO = {"auto", BEFORE}
-FIGURES = {"relmse_trimmed": "relMSE, trimmed", "relmse": "relMSE, all pixels", "flip": "FLIP"}
+INSIDE = {"flip_inside": "FLIP in glass and mirrors", "grain_inside": "grain in glass and mirrors"}
+FIGURES = {"relmse_trimmed": "relMSE, trimmed", "relmse": "relMSE, all pixels", "flip": "FLIP", **INSIDE}
 
 
 def finished(figures):

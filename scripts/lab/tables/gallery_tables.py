@@ -8,7 +8,14 @@ WIDTH = 120
 
 # The beginning of notes on scenes that a driver cannot translate.
 UNTRANSLATED = "no faithful translation: "
-MEASURES = {"relmse_trimmed": "relMSE, trimmed", "flip": "FLIP", "grain_trimmed": "grain, trimmed"}
+MEASURES = {
+    "relmse": "relMSE, all pixels",
+    "relmse_trimmed": "relMSE, trimmed",
+    "flip": "FLIP",
+    "grain_trimmed": "grain, trimmed",
+    "flip_inside": "FLIP in glass and mirrors",
+    "grain_inside": "grain in glass and mirrors",
+}
 NAMES = {
     "auto": "caustique",
     "mitsuba_path": "Mitsuba, path",
@@ -35,10 +42,12 @@ def losses(figures):
     found = []
     for row in values["rows"]:
         for key in values["compared"]:
-            ratio, best = max(((of[key], peer) for peer, of in row["ratios"].items()), default=(0, None))
+            ratio, best = max(((of[key], peer) for peer, of in row["ratios"].items() if key in of), default=(0, None))
             if ratio > 1:
                 found.append((ratio, row["scene"], key, best))
-    rows = [[scene, MEASURES[key], NAMES.get(best, best), f"{ratio:.2f}"] for ratio, scene, key, best in sorted(found)[::-1]]
+    rows = [
+        [scene, MEASURES[key], NAMES.get(best, best), f"{ratio:.2f}"] for ratio, scene, key, best in sorted(found)[::-1]
+    ]
     return table(["scene", "of", "best", "caustique over it"], rows)
 
 

@@ -48,12 +48,12 @@ pub fn read_layers(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<(LayerS
     })
 }
 
-/// [`read()`] of the layers within the data windows alone, outside which the picture is black.
+/// [`read()`] with the layers within the data windows alone, outside which the picture is black.
 ///
 /// # Errors
 /// As for [`read()`].
-pub fn read_window(path: &Path) -> Result<Windowed> {
-    Ok(open(path, |file, length| decode(file, length, &|_| true, Extent::Data))?.0)
+pub fn read_window(path: &Path) -> Result<(Windowed, Attributes)> {
+    open(path, |file, length| decode(file, length, &|_| true, Extent::Data))
 }
 
 /// The part of a picture that is read.
