@@ -22,10 +22,9 @@ esac
 setup python
 case $1 in
 compare) "$ROOT/scripts/compare/setup.sh" ;;
-calibration | scaling) [ -x "$ROOT/.venv-python/bin/python" ] || setup wheel ;;
-blend_files | export_speed | screenshots | torture | training_data | viewport_latency) setup test ;;
+calibration) [ -x "$ROOT/.venv-python/bin/python" ] || setup wheel ;;
+torture | training_data | viewport_latency) setup test ;;
 training) setup train ;;
-farms) setup farm ;;
 esac
 cd "$ROOT"
 if [ -z "${CAUSTIQUE_BIN:-}" ]; then

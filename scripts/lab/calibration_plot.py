@@ -1,14 +1,24 @@
-"""Draws docs/lab/calibration.svg from the stored figure: estimated against true errors, one mark per picture."""
+"""Draws docs/lab/calibration.svg from the stored figure: estimated against true errors, one mark per picture. Run by the
+Python of .venv-python, which has matplotlib.
+"""
 
-from .plots import pyplot, rows, save
+import matplotlib
+
+from .record import ROOT, entries
 
 # The largest ratio of estimated and true error that counts as correct.
 FACTOR = 1.5
 
 
 def main():
-    found = [row for row in rows("calibration") if row[3] and row[4]]
-    figure, axes = pyplot("calibration").subplots(figsize=(6.4, 5))
+    # Equal plots have equal bytes.
+    matplotlib.use("svg")
+    matplotlib.rcParams |= {"svg.hashsalt": "calibration", "svg.fonttype": "none", "font.size": 9}
+    from matplotlib import pyplot
+
+    stored = next(entry["values"]["rows"] for entry in entries() if entry["name"] == "calibration")
+    found = [row for row in stored if row[3] and row[4]]
+    figure, axes = pyplot.subplots(figsize=(6.4, 5))
     for index, name in enumerate(dict.fromkeys(row[0] for row in found)):
         chosen = [row for row in found if row[0] == name]
         mark = "os^Dv"[index // 10]
@@ -21,7 +31,8 @@ def main():
     axes.set(xscale="log", yscale="log", xlabel="true error of the finished picture", ylabel="estimated error")
     axes.set(xlim=ends, ylim=ends)
     axes.legend(fontsize=7, ncol=2)
-    save(figure, "calibration")
+    figure.tight_layout()
+    figure.savefig(ROOT / "docs" / "lab" / "calibration.svg", metadata={"Date": None})
 
 
 if __name__ == "__main__":

@@ -226,7 +226,7 @@ class Laboratory(unittest.TestCase):
         env = {**os.environ, "PYTHONPATH": str(support.ROOT / "scripts")}
         done = subprocess.run([*LAB, "nothing"], capture_output=True, text=True, check=False, env=env)
         self.assertEqual((done.returncode, done.stdout), (1, ""))
-        self.assertRegex(done.stderr, "^lab: error: no figure 'nothing'\nhint: one of: adaptive, .*\n$")
+        self.assertRegex(done.stderr, "^lab: error: no figure 'nothing'\nhint: one of: auto, .*\n$")
 
 
 class Tables(support.Scratch):
@@ -262,7 +262,7 @@ class Tables(support.Scratch):
         self.assertGreater(found, 10)
 
     def test_no_measured_table_is_typed(self):
-        for name in ("measurements.md", "negative-results.md"):
+        for name in ("measurements.md", "accuracy.md", "negative-results.md"):
             text = (support.ROOT / "docs" / "lab" / name).read_text(encoding="utf-8")
             typed = [line for line in tables.BLOCK.sub("", text).splitlines() if line.startswith("|")]
             self.assertEqual(typed, [], name)

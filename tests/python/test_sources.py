@@ -114,7 +114,7 @@ class Sources(unittest.TestCase):
             str(path.relative_to(SCRIPTS)): {str(o.relative_to(SCRIPTS)) for o in of} for path, of in edges.items()
         }
         self.assertIn("usd/faults.py", names["usd/convert.py"])
-        self.assertIn("lab/commands.py", names["lab/figures/sizes.py"])
+        self.assertIn("lab/commands.py", names["lab/figures/auto.py"])
         self.assertIn("compare/peers/plain_scene.py", names["lab/twins.py"])
 
     def test_names_of_modules_are_unique(self):

@@ -6,13 +6,14 @@ error in nine pictures of ten. If half a per cent of the pixels holds more than 
 the picture is counted separately.
 """
 
+import subprocess
+
 from .. import accuracy
 from .. import references
 from ..accuracy import geometric, short
 from ..cache import program
 from ..options import options
-from ..plots import draw
-from ..record import record
+from ..record import ROOT, record
 
 ARGUMENTS = accuracy.ARGUMENTS | {"name": None}
 # The largest ratio of a correct estimate, and the largest share of the noise in few pixels without a warning.
@@ -94,4 +95,6 @@ def main():
         for row in found
     ]
     record("calibration", values)
-    draw("calibration")
+    python = ROOT / ".venv-python" / "bin" / "python"
+    if python.exists():
+        subprocess.run([python, "-m", "lab.calibration_plot"], check=True)

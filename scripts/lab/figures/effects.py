@@ -6,17 +6,32 @@ scene is stored as a figure.
 """
 
 import math
+import subprocess
 import tempfile
 from pathlib import Path
 
-from ..cache import BIN
-from ..commands import read
-from ..iteration_times import fastest, intervals
+from ..commands import command, read
 from ..options import options
 from ..record import ROOT, record
 
 ALL = sorted(path.stem for path in (ROOT / "scenes").glob("*.glb"))
 ARGUMENTS = {"scenes": ALL, "rounds": 4, "iterations": 5, "width": 320}
+
+
+def intervals(scene, words, iterations, file):
+    """Renders a scene without its finish to a file; returns the core-seconds between the entries of the render's history,
+    which has iterations 1, 2, 3, 5, 8, .... The first iteration is left out, because it fills the caches."""
+    render = ["render", ROOT / "scenes" / f"{scene}.glb", "-o", file, *words]
+    line = command(*render, iterations=iterations, threads=1, no_finish=True, progress="none")
+    subprocess.run(line, check=True, stderr=subprocess.DEVNULL)
+    times = [entry["cpu_seconds"] for entry in read("info", file)["history"]]
+    return [after - before for before, after in zip(times, times[1:])]
+
+
+def fastest(runs, iterations):
+    """Core-seconds of an iteration, from the intervals of several runs: for each interval, the least of all runs counts,
+    because other work on the machine (also on the other thread of a core) only adds time."""
+    return sum(map(min, zip(*runs))) / (iterations - 1)
 
 
 def measure(scene, folder):
@@ -29,7 +44,7 @@ def measure(scene, folder):
     for turn in range(options.rounds):
         # The order alternates between rounds.
         for name, words in list(runs.items())[:: 1 if turn % 2 == 0 else -1]:
-            rounds[name].append(intervals(BIN, scene, words, options.iterations, folder / f"{name}.exr"))
+            rounds[name].append(intervals(scene, words, options.iterations, folder / f"{name}.exr"))
     seconds = {name: fastest(each, options.iterations) for name, each in rounds.items()}
     errors = {
         name: math.sqrt(read("compare", folder / f"{name}.exr", folder / "None.exr")["relmse_trimmed"])

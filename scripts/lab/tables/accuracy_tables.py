@@ -1,4 +1,4 @@
-"""Tables of estimated errors, of renders with an error target, and of the cost of options."""
+"""Tables of estimated errors, and of renders with an error target."""
 
 from .markdown import table
 
@@ -37,18 +37,4 @@ def target(figures):
     return table([*columns, "progress: predicted over real", "plan: predicted over real"], rows)
 
 
-def knobs(figures):
-    """Table of errors and core-seconds of renders, by option."""
-    rows = []
-    for group, label, options, spent, estimate, picture, gain, gain_finished, size in figures.one("knobs")["rows"]:
-        errors = [f"{100 * error:.1f} %" for error in (estimate, picture)]
-        gains = [f"{gain:.2f}", f"{gain_finished:.2f}"]
-        # These renders do not write the layer of the estimate.
-        if "--layers" in options:
-            errors[0] = gains[0] = "-"
-        rows.append([group, label, f"`{options}`", f"{spent:.1f}", *errors, *gains, f"{size:.1f}"])
-    columns = ["group", "row", "options", "core-s", "estimate", "finished", "gain", "gain finished", "MB"]
-    return table(columns, rows)
-
-
-KINDS = {"calibration": calibration, "target": target, "knobs": knobs}
+KINDS = {"calibration": calibration, "target": target}

@@ -1,5 +1,6 @@
 """The gallery: all scenes by caustique and by other renderers."""
 
+import re
 import textwrap
 
 from .markdown import digits, table
@@ -52,20 +53,13 @@ def losses(figures):
 
 
 def peers(figures):
-    """Our errors over those of the other renderers, the greatest mean first."""
+    """Geometric means of our errors over those of the other renderers, and the numbers of scenes in which ours are less."""
     values = figures.one("peers")
-    found = [(peer, key, *of) for peer, all_of in values["summary"].items() for key, of in all_of.items()]
-    rows = [
-        [NAMES.get(peer, peer), MEASURES[key], f"{mean:.2f}", f"{worst:.2f}", f"{better} of {count}"]
-        for peer, key, mean, worst, better, count in sorted(found, key=lambda one: -one[2])
-    ]
-    return table(["caustique over", "of", "geometric mean", "worst", "better on"], rows)
-
-
-def title(key):
-    """The name of a renderer; a key may have a second word, as in "cycles_path approximates"."""
-    peer, _, word = key.partition(" ")
-    return f"{NAMES.get(peer, peer)} {word}".strip()
+    rows = []
+    for peer, of in values["summary"].items():
+        cells = [of.get(key) for key in values["compared"]]
+        rows.append([NAMES.get(peer, peer), *(f"{one[0]:.2f} ({one[2]} of {one[3]})" if one else "-" for one in cells)])
+    return table(["caustique over", *(MEASURES[key] for key in values["compared"])], rows)
 
 
 def plain(note):
@@ -73,6 +67,35 @@ def plain(note):
     for old, new in NOTES.items():
         note = note.replace(old, new)
     return note
+
+
+def incomparable(notes):
+    """The names of the renderers whose pictures are not compared, by reason, with the ratio of the means where that is the
+    reason."""
+    found = {}
+    for peer, note in notes.items():
+        mean = re.fullmatch(r"not comparable: its mean is (\S+) of the reference's.*", note)
+        reason = "not comparable, because the mean is not the reference's" if mean else plain(note)
+        found.setdefault(reason, []).append(NAMES.get(peer, peer) + (f" ({mean[1]})" if mean else ""))
+    return found
+
+
+def approximations(rows):
+    """The programs that approximate something in any of the scenes, by what they approximate."""
+    found = {}
+    for row in rows:
+        for key, note in row["notes"].items():
+            peer, _, word = key.partition(" ")
+            if word == "approximates":
+                for part in plain(note).split("; "):
+                    found.setdefault(part, {})[NAMES.get(peer, peer).split(",")[0]] = None
+    return found
+
+
+def _items(found):
+    """A list with the names behind each text."""
+    items = (f"- {', '.join(names)}: {text}" for text, names in found.items())
+    return "".join(textwrap.fill(item, WIDTH, subsequent_indent="  ") + "\n" for item in items)
 
 
 def _is_translated(row):
@@ -105,9 +128,9 @@ def gallery(figures):
             for peer, of in row["figures"].items()
         ]
         parts.append("\n".join(lines) + "\n" + table(head, cells))
-        items = (f"- {title(of)}: {plain(note)}" for of, note in row["notes"].items())
-        notes = [textwrap.fill(item, WIDTH, subsequent_indent="  ") for item in items]
-        parts += ["\n".join(notes) + "\n"] if notes else []
+        notes = _items(incomparable({key: note for key, note in row["notes"].items() if " " not in key}))
+        parts += [notes] if notes else []
+    parts.append("### Approximations of the drivers\n\n" + _items(approximations(values["rows"])))
     return "\n".join(parts)
 
 
