@@ -92,6 +92,18 @@ class Sources(unittest.TestCase):
         )
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
 
+    def test_all_files_state_one_version(self):
+        def text(name):
+            return (support.ROOT / name).read_text(encoding="utf-8")
+
+        version = re.search(r'^version = "([\d.]+)"', text("Cargo.toml"), re.MULTILINE)[1]
+        addon = "scripts/blender/caustique_addon/"
+        self.assertIn(f"\nversion: {version}\n", text("CITATION.cff"))
+        self.assertIn(f'\nversion = "{version}"\n', text(addon + "blender_manifest.toml"))
+        self.assertIn(f'"version": ({version.replace(".", ", ")}),', text(addon + "__init__.py"))
+        for page in ("README.md", "docs/install.md", "docs/python.md"):
+            self.assertEqual(set(re.findall(r"caustique-(\d+\.\d+\.\d+)", text(page))) - {version}, set(), page)
+
     def test_no_lint_is_silenced_and_no_script_changes_the_search_path(self):
         for path in sources():
             text, name = path.read_text(encoding="utf-8"), str(path.relative_to(SCRIPTS))
