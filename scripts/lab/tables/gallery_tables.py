@@ -98,6 +98,14 @@ def _items(found):
     return "".join(textwrap.fill(item, WIDTH, subsequent_indent="  ") + "\n" for item in items)
 
 
+def best(figures, by):
+    """The figures of each program's variant with the least error, the figure number `by`."""
+    found = {}
+    for peer, of in figures.items():
+        found.setdefault(NAMES.get(peer, peer).split(",")[0], []).append((of[by], peer))
+    return {peer: figures[peer] for _, peer in map(min, found.values())}
+
+
 def _is_translated(row):
     """Whether any other renderer has a picture of a row's scene."""
     return bool(row["core_seconds"].keys() - {"auto"})
@@ -114,7 +122,7 @@ def untranslated(figures):
 
 
 def gallery(figures):
-    """A picture and a table for every scene of which another renderer has a picture."""
+    """A picture, and a table of the best variant of each renderer, for every scene of which another one has a picture."""
     values = figures.one("peers")
     parts = []
     for row in filter(_is_translated, values["rows"]):
@@ -125,7 +133,7 @@ def gallery(figures):
         head = ["", "core-s", *(MEASURES[key] for key in values["compared"])]
         cells = [
             [NAMES.get(peer, peer), f"{row['core_seconds'].get(peer, float('nan')):.1f}", *map(digits, of)]
-            for peer, of in row["figures"].items()
+            for peer, of in best(row["figures"], values["compared"].index("relmse_trimmed")).items()
         ]
         parts.append("\n".join(lines) + "\n" + table(head, cells))
         notes = _items(incomparable({key: note for key, note in row["notes"].items() if " " not in key}))
