@@ -182,7 +182,7 @@ class Text(unittest.TestCase):
         known = "".join(support.run([*words, "--help"], check=0).stdout for words in ([], *([name] for name in names)))
         for script in ("scripts/blender/export.py", "scripts/farm/ray_render.py", "scripts/farm/slurm.sh", "tests/hard/run.py"):
             known += (support.ROOT / script).read_text(encoding="utf-8")
-        known += "".join(f"--{name.replace('_', '-')} " for name in lab.options.KNOWN)
+        known += "".join(f"--{name.replace('_', '-')} " for name in (*lab.options.KNOWN, "short"))
         known = set(re.findall(r"--[a-z][a-z-]*", known))
         for page in PAGES:
             if page.name in ("measurements.md", "architecture.md"):  # They name options of cargo and of scripts, too.
