@@ -17,7 +17,8 @@ TARGET = "x86_64-unknown-linux-gnu"
 
 
 def metadata():
-    """The packages of the workspace for the target of the packages, with their dependencies."""
+    """Returns the crates of the workspace and their dependencies for the released target, as `cargo metadata` prints
+    them."""
     words = ["cargo", "metadata", "--locked", "--format-version", "1", "--filter-platform", TARGET]
     return json.loads(subprocess.run(words, cwd=ROOT, check=True, stdout=subprocess.PIPE).stdout)
 

@@ -77,7 +77,8 @@ def _faceted(mix):
 
 
 def weigh(tree, graph, weight=1.0):
-    """Pairs of a leaf and its weight, a value of `graph`. Leaves of weight 0 are left out."""
+    """Returns the shaders (leaves) that a tree of mixes adds up, each with its weight, a value of `graph`. Shaders of
+    weight 0 are left out."""
     if tree is None or (is_constant(weight) and weight == 0):
         return []
     if isinstance(tree, Leaf):

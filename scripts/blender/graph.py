@@ -220,7 +220,7 @@ class Graph:
         return self._binary("MAXIMUM", max, a, b)
 
     def power(self, a, exponent):
-        """A value to a constant power; negative values count as 0."""
+        """Returns the socket, or the number, of `a` to a constant power. Negative values count as 0."""
         if is_constant(a) or not is_colour(a):
             return self._binary("POWER", lambda x, y: max(x, 0.0) ** y, a, exponent)
         split = self.tree.nodes.new("ShaderNodeSeparateXYZ")  # Vector Math has no power before Blender 4.5

@@ -129,7 +129,8 @@ def encoded(values):
 
 
 def png(picture):
-    """A picture of linear values from 0 to 1, bottom row first, as a PNG of 16 bits per channel."""
+    """Returns the bytes of a PNG with 16 bits per channel of a picture of linear values from 0 to 1, bottom row
+    first."""
     height, width, _ = picture.shape
     words = numpy.rint(encoded(picture[::-1]) * 65535).astype(">u2").reshape(height, -1)
     rows = b"".join(b"\0" + row.tobytes() for row in words)

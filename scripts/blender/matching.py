@@ -47,7 +47,8 @@ class _Match:
         self.reader = Reader(graph, say)
 
     def surface(self, weighed, has_volume):
-        """The matched surface of pairs of leaf and weight."""
+        """Returns the surface of a mix of shaders, in terms of glTF. `weighed`: pairs of a shader node (leaf) and its
+        weight."""
         g, clear, lobes, shining, kinds = self.graph, [], [], [], []
         self.adds_up &= all(leaf.type not in {"EMISSION", "HOLDOUT", "BSDF_RAY_PORTAL"} for leaf, _ in weighed)
         for leaf, weight in weighed:

@@ -250,7 +250,7 @@ class Plan:
         return channels
 
     def _warn_of_steep_normals(self, cosines):
-        """Warn of normals from the cosines between them and the surface normal."""
+        """Warn if shading normals lean too far from the surface. `cosines`: of the angles between both normals."""
         if bpy.app.version < (4, 4, 0) and (self.bumped or any(n.type == "BUMP" for t in self.graph.trees() for n in t.nodes)):
             self.say(_OLD_BUMP_WARNING)
         if numpy.mean(cosines < _STEEP_COSINE) > _MIN_STEEP:

@@ -37,7 +37,8 @@ def shutter(scene, layer):
 
 
 def warn_of_losses(scene, warn):
-    """Warn of shutters that do not open and close at once for the whole picture."""
+    """Warn about a rolling shutter or a shutter curve: caustique opens and closes the shutter at once for all
+    pixels."""
     where = f'scene "{scene.name}"'
     if getattr(getattr(scene, "cycles", None), "rolling_shutter_type", "NONE") != "NONE":
         warn(where, "its rolling shutter is not carried: all rows see the same time")

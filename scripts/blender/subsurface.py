@@ -103,7 +103,7 @@ def _shown(colour, ior, alpha, steps=64):
 
 
 def _scale(colour, ior, method):
-    """Mean free path of Cycles relative to Blender's radius."""
+    """Returns the mean free path that Cycles uses, as a multiple of the radius that is set in Blender."""
     if method != _SKIN:
         return 0.25 / math.pi
     inverse = 1 / ior

@@ -410,7 +410,7 @@ ALL = (glass, frosted, metal, textures, wide)
 
 
 def main():
-    """The command."""
+    """Writes all comparison scenes into the folder that the command line names."""
     if len(sys.argv) != 2:
         sys.exit(__doc__)
     folder = Path(sys.argv[1])

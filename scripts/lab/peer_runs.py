@@ -93,7 +93,8 @@ class Peers:
         return folder
 
     def pictures(self, folder):
-        """A peer's picture, and the picture denoised by OIDN with the guides."""
+        """Returns a renderer's picture (`noisy`) and, if OIDN is installed, that picture denoised with noise-free
+        guides (`oidn`)."""
         found = {"noisy": Layers(folder / "picture.exr").get("")}
         if not (folder / "oidn.exr").exists():
             write(folder / "noisy.exr", picture=found["noisy"], **self.guides())

@@ -109,7 +109,8 @@ class Shot:
         animation["channels"].append(target)
 
     def write(self, path):
-        """Writes the shot, unless the file has these bytes already: its references stay valid."""
+        """Writes the shot to `path`. A file that has these bytes already is left alone, so that its cached references
+        stay valid."""
         path.parent.mkdir(parents=True, exist_ok=True)
         draft = path.with_suffix(".part")
         gltf.pack(draft, self.document, self.binary)

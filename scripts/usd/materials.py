@@ -354,7 +354,7 @@ def set_emission(document, entry, radiance):
 
 
 def _medium(surface, metres):
-    """Coefficients (1/m) of OpenPBR's interior.
+    """Returns the absorption and scattering coefficients (1/m) inside an OpenPBR surface.
 
     Extinction follows from the colour after the depth; scattering is scatter / depth. Absorption is their difference,
     shifted so that no channel is negative.

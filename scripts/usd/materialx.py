@@ -109,7 +109,7 @@ def _read(reader, shader, name, default, key):
 
 
 def _set_interior(out, given, where, losses):
-    """Set the interior of a transmissive surface."""
+    """Set absorption, scattering and dispersion inside a transmissive surface from the values `given` of its inputs."""
     out.transmission = given["transmission"]
     if not out.transmission:
         return

@@ -69,7 +69,8 @@ class Reader:
         return default if found is None else self._convert(shader, name, _constant(found), default)
 
     def constant(self, shader, name, default):
-        """The constant of an input; for textures and primvars `default`, with a loss."""
+        """Returns the constant value of an input. If a texture or a primvar feeds the input, returns `default` and
+        records a warning."""
         found = self.read(shader, name, default)
         if isinstance(found, (Texture, Primvar)):
             self.stage.losses.add(shader.GetPath(), f"what feeds {name} is not carried: it has its default")
@@ -81,7 +82,8 @@ class Reader:
         return self.stage.get(shader.GetIdAttr(), "")
 
     def _enter(self, shader_input):
-        """Push an input onto the stack. Returns false, with a loss, for cycles and networks that are too deep."""
+        """Push an input onto the stack of open inputs. Returns false, and records a warning, if the network has a cycle
+        or is too deep."""
         path = shader_input.GetAttr().GetPath()
         if path in self._open or len(self._open) >= _MAX_DEPTH:
             what = "feeds itself" if path in self._open else f"is more than {_MAX_DEPTH} nodes deep"
@@ -91,7 +93,7 @@ class Reader:
         return True
 
     def _convert(self, shader, name, found, default):
-        """A constant converted to the type of `default`; longer vectors are truncated, such as a colour with
+        """Returns a constant, converted to the type of `default`. Longer vectors are truncated, such as a colour with
         opacity."""
         if default is None or isinstance(found, (Texture, Primvar)) or kind_of(found) == kind_of(default) == "text":
             return found

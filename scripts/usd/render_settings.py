@@ -78,7 +78,7 @@ class Settings:
         return not self.get("disableDepthOfField", False)
 
     def blurs(self):
-        """Whether what moves is blurred."""
+        """Whether the stage asks for motion blur."""
         return not self.get("disableMotionBlur", False)
 
     def aspect(self):

@@ -179,7 +179,7 @@ class Textures:
         return self._data[path]
 
     def _load(self, texture):
-        """Texels (height, width, channels) as stored in the file; integers are scaled to 0 to 1."""
+        """Returns the texels (height, width, channels) as stored in the file, integers scaled to 0 to 1."""
         return _scaled(*self._decoded(texture))[0]
 
     def _decoded(self, texture):

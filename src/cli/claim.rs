@@ -272,7 +272,7 @@ mod tests {
         assert_eq!(fs::read_dir(folder.path()).expect("it can be read").count(), 1);
     }
 
-    /// Processes of other users count as alive, and so does a text that is no number.
+    /// Claims of processes of other users, and claims without a process number, count as alive.
     #[test]
     fn processes_of_others_are_alive() {
         let own = std::process::id().to_string();

@@ -45,7 +45,7 @@ impl Network {
         Ok(Network { session, metadata, name: model.name.clone() })
     }
 
-    /// The network's metadata.
+    /// Metadata of the network's file: its inputs, windows and levels.
     pub fn metadata(&self) -> &Metadata {
         &self.metadata
     }

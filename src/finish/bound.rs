@@ -83,7 +83,7 @@ pub fn spread(estimate: &Estimate) -> Picture {
     Picture::new(size, spread)
 }
 
-/// A standard error that is not negative; infinite if it is not finite.
+/// The standard error `error`, at least 0; infinity if it is not a finite number.
 fn known(error: f32) -> f32 {
     if error.is_finite() { error.max(0.0) } else { f32::INFINITY }
 }

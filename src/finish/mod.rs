@@ -160,7 +160,7 @@ fn lobe_colors(set: &LayerSet) -> Vec<Named> {
     LOBE_COLORS.iter().filter_map(|name| Some(((*name).to_owned(), set.picture(name)?))).collect()
 }
 
-/// Pictures that [`Finish::deliver`] estimates the error by.
+/// Pictures from which [`Finish::deliver`] estimates the error of the finished picture.
 pub struct ErrorSource {
     quarters: [Picture; QUARTERS],
     /// The method's own bandwidth level and the next larger one, if the picture has both.

@@ -336,7 +336,7 @@ struct Pair {
     pixels: Vec<Option<Difference>>,
 }
 
-/// The difference between a pixel of a frame and its place in another one.
+/// The difference between a pixel of a frame and its counterpart in another frame.
 struct Difference {
     /// Difference of the estimates.
     estimate: [f32; 3],
@@ -440,7 +440,7 @@ impl<'a> Average<'a> {
         })
     }
 
-    /// The average of a picture of each frame; `None` stands for a black one.
+    /// The weighted average of one picture per frame, such as the estimate; `None` stands for a black picture.
     fn of(&self, own: &Picture, others: &[Option<&Picture>]) -> Picture {
         Picture::from_fn(own.size(), |i| {
             let (mut sum, mut total) = (own[i], 1.0);
@@ -455,7 +455,7 @@ impl<'a> Average<'a> {
         })
     }
 
-    /// Standard errors of the average, by all iterations.
+    /// Standard errors of the average of the frames, from the standard errors of each frame's estimate.
     fn deviation(&self) -> Picture {
         let own = &self.own.pictures.estimate.deviation;
         Picture::from_fn(own.size(), |i| {

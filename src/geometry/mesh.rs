@@ -112,7 +112,7 @@ pub struct Instance {
 /// An affine transform of points, and the matching transform of normals.
 #[derive(Clone, Copy, Debug)]
 pub struct Placement {
-    /// Transform of points and directions.
+    /// Transform of points and directions from local to world space.
     pub points: Affine3A,
     /// Transform of normals up to length: the inverse transpose. As glTF requires, the front of a mirrored mesh stays
     /// its front.

@@ -211,8 +211,9 @@ pub fn compare_with_floor(a: &LayerSet, b: &LayerSet, floor: Floor) -> Result<Co
     compare_pictures(&a.beauty()?, &b.beauty()?, floor, 0)
 }
 
-/// Compares two pictures as [`compare_with_floor`] does, within the windows of their files: what lies outside both costs
-/// neither time nor memory. Returns the comparison, and the pictures in their common window, which its map of FLIP has.
+/// Compares two pictures as [`compare_with_floor`] does, within the windows of their files. Pixels outside both windows
+/// cost neither time nor memory. Returns the comparison, and both pictures in the window that contains both, which is
+/// also the window of the FLIP map.
 ///
 /// # Errors
 /// As [`compare`].

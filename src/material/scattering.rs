@@ -21,7 +21,7 @@ struct PreparedMaterial {
     unlit: bool,
     /// Whether the material has neither normal maps nor anisotropy.
     plain_frame: bool,
-    /// Base colour before the vertex colour, metalness and transmission of the material; `None` if they have textures.
+    /// Base colour (without the vertex colour), metalness and transmission; `None` if any of them has a texture.
     shares: Option<(Vec4, f32, f32)>,
     /// Relative index of refraction and interface of the material in empty space; `None` if textures affect the
     /// interface.

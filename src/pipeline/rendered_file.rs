@@ -9,7 +9,7 @@ use std::path::Path;
 pub struct RenderedFile {
     /// All layers, under plain names.
     pub set: LayerSet,
-    /// The file's attributes.
+    /// Attributes of the EXR header, such as the JSON object `caustique`.
     pub attributes: Attributes,
     /// Names of the file's channels, which its cryptomatte attributes also use.
     pub naming: Naming,

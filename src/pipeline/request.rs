@@ -24,7 +24,7 @@ pub enum MethodRequest<'a> {
 
 /// The candidates of `auto` (methods with settings).
 pub struct AutoRequest<'a> {
-    /// Settings for the checks that precede the choice, and for the render if the options leave nothing to compare.
+    /// Settings of the render if the options leave only one candidate, and for the checks before the pilot.
     pub fallback: Settings,
     /// Makes the settings of each candidate.
     pub settings_of: SettingsOf<'a>,

@@ -28,7 +28,7 @@ pub enum Effect {
     Environment,
     /// Surfaces that are cut out or blended by alpha.
     Alpha,
-    /// Textures of materials.
+    /// Textures of materials. Without this effect, their mean values are used.
     Textures,
 }
 

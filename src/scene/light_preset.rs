@@ -195,7 +195,7 @@ impl SoftBox {
     }
 }
 
-/// Radiance of the studio.
+/// Radiance that arrives from the direction `d` in the neutral studio.
 fn studio(d: Vec3) -> Vec3 {
     /// Radiance of the floor below the scene, of the horizon and of the ceiling.
     const SURROUNDINGS: [f32; 3] = [0.2, 0.4, 0.45];

@@ -242,7 +242,7 @@ impl Technique {
     }
 }
 
-/// The kind of a path that brings light to a pixel.
+/// Class, light group and first scattering of a path that brings light to a pixel: they select its layers.
 #[derive(Clone, Copy, Debug)]
 pub struct PathKind {
     /// Class of the path: the kinds of its bounces.

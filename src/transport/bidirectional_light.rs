@@ -102,7 +102,7 @@ struct LightWalk<'a, 's, R> {
     prefix: LightPrefix,
     /// Lobes of the BSDF at the last vertex; `None` in a medium.
     lobes: Option<LobeSet>,
-    /// Probability of the decisions of alpha about the solids around the start of the segment, at the last vertex.
+    /// Probability of the random decisions whether the solids around the last vertex exist, whose alpha is below 1.
     chance: f32,
     photons_only: bool,
     vertices: &'a mut LightVertices<'s>,

@@ -143,7 +143,7 @@ pub(super) struct GlintGather<'s, K> {
     /// Squared radius within which photons are evaluated (square scene units).
     reach2: f32,
     sums: [Rgb; MAX_LEVELS],
-    /// Index of the radius for which the light is divided into reflected and transmitted light; `None` if it is not.
+    /// Index of the radius whose light is also recorded as reflected and transmitted light; `None` without such layers.
     divided: Option<usize>,
     /// Transmitted light of that radius.
     transmitted: Rgb,

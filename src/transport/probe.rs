@@ -11,7 +11,7 @@ use crate::random::Stream;
 use bumpalo::Bump;
 use std::f32::consts::FRAC_1_PI;
 
-/// The first point where a camera path gathers photons.
+/// The first surface point on a camera path at which photons are gathered.
 #[derive(Clone, Copy, Debug)]
 pub struct GatherPoint {
     /// World position.

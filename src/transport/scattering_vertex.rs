@@ -44,7 +44,7 @@ pub trait ScatterPoint {
     fn sample(&self, transport: Transport, set: LobeSet, u_lobe: f32, u: Vec2) -> Option<BsdfSample>;
     /// Absolute cosine between `w` and the geometric normal; 1 in a medium.
     fn cos(&self, w: Vec3) -> f32;
-    /// Origin of a ray towards `w`.
+    /// Origin of a ray from this vertex towards `w`: off the surface by the bound on rounding errors.
     fn ray_origin(&self, w: Vec3) -> Vec3;
     /// The solids around the path on the side of `wo`, and on the other side of the surface.
     fn interiors(&self) -> [&Interior; 2];

@@ -68,7 +68,7 @@ pub enum PrecomputedHit {
     Hit(Hit),
 }
 
-/// The end of a ray.
+/// Where a ray ends: at a surface, in a medium, or outside the scene.
 // Boxing the large variant would allocate once per ray.
 #[allow(clippy::large_enum_variant)]
 pub enum End {

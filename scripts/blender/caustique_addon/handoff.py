@@ -96,7 +96,7 @@ class Exporter:
 
 
 class Job:
-    """An export to the file `GLB` in a folder. `run` may be called from any thread."""
+    """An export of the copied scene to the file `GLB` in a folder. `run` may be called from any thread."""
 
     def __init__(self, scene, view_layer, frame, folder, blender, only=None):
         """Prepare the export of `scene` at `frame` (a float) to the empty `folder`. `blender`: another exporting

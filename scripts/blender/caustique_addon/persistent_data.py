@@ -31,7 +31,7 @@ _changed = False  # whether the next frame needs a new copy of the scene
 
 
 def applies(scene, is_animation):
-    """Whether frames may share an exporter."""
+    """Whether the frames of a render may share one copy of the scene and the Blender that exports it."""
     return is_animation and scene.render.use_persistent_data
 
 

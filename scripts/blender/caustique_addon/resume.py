@@ -35,7 +35,7 @@ class Checkpoint:
         self._stopped_at = None  # when the user stopped the render
 
     def exists(self):
-        """Whether there is a state to go on with."""
+        """Whether a checkpoint exists from which this render can continue."""
         return os.path.isfile(self.path)
 
     def stopped(self):

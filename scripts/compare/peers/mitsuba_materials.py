@@ -174,7 +174,8 @@ class Materials:
         return {"type": "corrected", "kind": "glass", "nested": nested, "alpha": alpha, "base": base, "ior": float(ior)}
 
     def color(self, raw, info, factor):
-        """Colour factor times an sRGB texture."""
+        """Returns an sRGB texture times a factor as a texture of Mitsuba, or the factor as a colour if `info` is
+        None."""
         if info is None:
             return {"type": "rgb", "value": [float(x) for x in factor]}
         return self._bitmap(info, lambda texels: _linear(texels[..., :3]) * np.asarray(factor, np.float32))

@@ -75,7 +75,7 @@ class Node:
         return Unsupported(f"{self.title}: {text}")
 
     def drop(self, text):
-        """Warn that the element is left out or replaced. Nothing else is said of its parameters."""
+        """Warn that the element is left out or replaced, instead of warning about each of its parameters."""
         self.used = self.dropped = True
         self.document.lose(f"{self.title}: {text}")
 
@@ -185,7 +185,7 @@ class Node:
         return np.broadcast_to(found, 3)
 
     def vector(self, name):
-        """A child as three numbers, or None."""
+        """Returns the child element `name` as three numbers, or None without such a child."""
         found = self.child(name)
         return None if found is None else found.three()
 

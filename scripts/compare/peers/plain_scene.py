@@ -130,7 +130,7 @@ class Scene:
         return made
 
     def _faults(self, raw, surface, extensions, name):
-        """Features of a material that no kind supports."""
+        """Returns texts on the features of a material that no `Surface` can hold."""
         strange = sorted(set(extensions) - SUPPORTED)
         textures = [key for key in ("normalTexture", "emissiveTexture") if key in raw]
         textures += [key for key in ("metallicRoughnessTexture",) if key in surface]
@@ -206,7 +206,8 @@ def ball(light):
 
 
 def disc(toward, radius, irradiance, height, width, fine=8):
-    """A sun's disc of angular `radius` around a direction, on the grid of `Scene.environment`, with its irradiance."""
+    """Returns a picture of the sky, on the grid of `Scene.environment`, that holds a sun: a disc of angular `radius`
+    around a direction, with a given irradiance."""
     v = (np.arange(height * fine) + 0.5) / (height * fine) * np.pi
     rows = np.abs(v - np.arccos(np.clip(toward[1], -1, 1))) < radius + np.pi / height
     rows = np.repeat(rows.reshape(height, fine).any(1), fine)

@@ -58,7 +58,7 @@ def write(path, output, lose=gltf.refuse):
 
 
 def _types(described):
-    """The plug-ins in a description."""
+    """Yields the types of the Mitsuba plug-ins in a nested description (dict)."""
     if isinstance(described, dict):
         yield described["type"]
         for part in described.values():

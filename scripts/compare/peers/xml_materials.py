@@ -426,7 +426,7 @@ def set_base(found, made, lose, place):
 
 
 def unit(color, lose, place):
-    """A colour, limited to 0 to 1."""
+    """Returns a colour clamped to 0 to 1, and records a warning by `lose` if that changes the colour."""
     limited = np.clip(color, 0.0, 1.0)
     if not np.allclose(limited, color, atol=1e-6):
         lose(f"{place}: its colour {np.round(color, 3).tolist()} is limited to 0 to 1")

@@ -21,7 +21,7 @@ FACTOR, RARE = 1.5, 0.5
 
 
 def rows():
-    """The estimated and the true error of every picture."""
+    """Yields the estimated and the true error of every picture, as a dict."""
     for scene, truth in accuracy.truths():
         for method in options.methods:
             for budget in options.budgets:
@@ -53,7 +53,7 @@ def summary(rows):
 
 
 def line(label, found):
-    """A row of the printed table, as text."""
+    """Returns a row of the printed table."""
     if not found.get("told"):
         return f"{label:<28}{found['pictures']:>9}{0:>6}"
     text = f"{label:<28}{found['pictures']:>9}{found['told']:>6}{found['within']:>8}{found['geometric_mean']:>8.2f}"

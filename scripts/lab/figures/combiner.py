@@ -81,7 +81,8 @@ def combine(scene, run, picture, independent=None):
 
 
 class Made(NamedTuple):
-    """A picture of a row; the shares of a network's pairs in its weights, and its core-seconds."""
+    """A picture of a row of the table, the share of each pair of pictures in the network's weights, and the network's
+    core-seconds."""
 
     picture: object
     shares: dict = {}

@@ -179,7 +179,7 @@ def measure(scene, names):
 
 
 def count(cells):
-    """Prints and returns the goals of each set and budget."""
+    """Prints and returns the ratios of errors (lab/goals.py) of each set of scenes and each budget."""
     counts = {}
     delivered = f"{'auto' if 'auto' in options.methods else options.methods[0]} {denoisers()[0]}".strip()
     for kind in ("first", "second", "twins"):

@@ -64,7 +64,7 @@ def render(scene, options):
 
 
 def measure(scene, options, truth):
-    """The core-seconds, the errors of the estimate and of the finished picture, and the bytes of a render."""
+    """Returns the core-seconds, the errors of the estimate and of the finished picture, and the bytes of a render."""
     folder = render(scene, options)
     run, layers = load(folder / "run.json"), Layers(folder / "picture.exr")
     noisy = layers.get("Noisy")

@@ -37,7 +37,7 @@ WORDS = ["--light-units", "photometric", "--method", "auto", "--seed", "0", "--i
 
 
 class Client:
-    """A viewport without a window. Times are those at which pictures arrive."""
+    """Drives `caustique serve` as a viewport of Blender does, and keeps the times at which pictures arrive."""
 
     def __init__(self):
         self.pictures, self.answers = queue.Queue(), queue.Queue()

@@ -178,7 +178,7 @@ class AffinitySums(torch.autograd.Function):
 
 
 class KernelSums(torch.autograd.Function):
-    """`reference_kernel`, compiled; the difference is not differentiated."""
+    """The same sums as `reference_kernel`, by compiled code. Gradients do not flow into the argument `difference`."""
 
     @staticmethod
     def forward(ctx, weights, difference, window, dilation=1):

@@ -93,7 +93,7 @@ def independent_file(method, seed):
 
 
 class Maker:
-    """Renders views with one program, which a copy in the folder of the data keeps."""
+    """Renders views. All of them use the same program, of which the folder of the data has a copy."""
 
     def __init__(self, folder, binary):
         self.folder, self.binary = folder, folder / "caustique"
@@ -302,8 +302,8 @@ def vertical_angle(scene):
 
 
 def target_method(simulated):
-    """Options of the method of a target: bdpt has no bias; vcm also finds the caustics that mirrors and glass show,
-    with a bandwidth that falls below a pixel."""
+    """Returns the options of the method that renders a reference picture: bdpt, which has no bias, or vcm with
+    bandwidths below a pixel, which also finds the caustics seen in mirrors and through glass."""
     if not simulated.get("sds", True):
         return {"method": "bdpt"}
     return {"method": "vcm", "guide": "on", "alpha": 0.5}

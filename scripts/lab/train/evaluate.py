@@ -49,7 +49,7 @@ def errors(net, arrays, k, device="cpu"):
 
 
 def evaluated(arrays):
-    """The numbers of the snapshots of a stack that are evaluated."""
+    """Returns the indices of the stored numbers of iterations at which a view is evaluated."""
     return [k for k in SNAPSHOTS if k < len(arrays["iterations"])]
 
 

@@ -115,7 +115,8 @@ def iteration_plane(stack, scale, middle):
 
 
 def clamped(name, low, high):
-    """The planes of vectors, clamped."""
+    """Returns a function that makes input planes of the layer `name` of a stack, with values clamped to `low` and
+    `high`."""
     return lambda stack, scale, middle: np.moveaxis(np.clip(finite(stack[name]), low, high), -1, 0)
 
 

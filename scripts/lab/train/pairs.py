@@ -9,7 +9,8 @@ def level_pairs(*numbers):
 
 
 def finished_pairs(stack):
-    """Levels 2 to 5, which share one camera path, with the denoised picture."""
+    """Returns the pairs of pictures for networks that read the finished picture: each of the levels 2 to 5, which share
+    one camera path, with the denoised picture."""
     return stack["levels"][1:], stack["finished"][None].repeat(4, 0)
 
 

@@ -36,7 +36,8 @@ def files(folder, held_out, methods=("sppm", "vcm"), paths=(1, 2), pairs="multi"
 
 
 def read(item):
-    """The arrays of a noisy stack, by snapshot, and `halves` of its target."""
+    """Returns the arrays of the noisy pictures of a view, by name, and those of its reference, whose two independent
+    halves have the name `halves`."""
     folder, method, seed = item
     arrays = mapped(folder / f"{method}-seed{seed}.npz") | mapped(folder / f"{method}-target.npz")
     independent = folder / independent_file(method, seed)
@@ -68,7 +69,8 @@ def whole(arrays):
 
 
 def snapshot(arrays, k, pairs="multi", part=None):
-    """Snapshot k as a stack (normalise.py) in float32, with `halves`; of a part of the pixels (slices of rows and
+    """Returns the pictures after the k-th stored number of iterations as a stack (normalise.py) of float32, with
+    `halves`; of a part of the pixels (slices of rows and
     columns) if given."""
     rows, columns = part or whole(arrays)
     stack = {}
@@ -114,7 +116,8 @@ def augment(stack, rng):
 
 
 def sample(stack, pairs, version):
-    """(input, y, z, halves): float32 arrays [c, h, w], [pairs, 3, h, w] twice, and [2, 3, h, w]. Views are stored with
+    """Returns the input of a network, the pictures y and z of equation (6), and the halves of the reference: float32
+    arrays [c, h, w], [pairs, 3, h, w] twice, and [2, 3, h, w]. Views are stored with
     the exposure of their picture, so the scales are 1."""
     y, z = PAIRS[pairs].of(stack)
     planar = lambda pictures: np.ascontiguousarray(np.moveaxis(pictures, -1, -3), np.float32)

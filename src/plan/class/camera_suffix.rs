@@ -76,7 +76,8 @@ impl CameraSuffix {
         }
     }
 
-    /// The class of the light path if the camera path ends on a light here. `sizeless`: the light is a delta light.
+    /// The class of the light path if the camera path ends on a light here. `sizeless`: the light has no size, so that
+    /// no camera path can hit it.
     #[inline]
     pub fn class_at_light(self, sizeless: bool) -> PathClass {
         use PathClass as C;

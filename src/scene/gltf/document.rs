@@ -34,7 +34,7 @@ pub(super) struct Document<'a> {
     pub(super) chosen_scene: Option<usize>,
     /// The animations that move the nodes.
     pub(super) playing: Playing,
-    /// Number of elements without data (zeros) that the file may still have.
+    /// Number of accessor elements without data, which count as zeros, that the file may still declare.
     pub(super) zeros_left: Cell<u64>,
     /// Bytes that were allocated since free memory was last checked.
     unchecked_bytes: Cell<u64>,

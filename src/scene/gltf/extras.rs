@@ -42,7 +42,7 @@ pub(super) enum Rate {
 }
 
 impl Rate {
-    /// Numerator and denominator of the rate.
+    /// Numerator and denominator of the number of frames per second.
     pub(super) fn fraction(self) -> [u32; 2] {
         match self {
             Rate::Whole(rate) => [rate, 1],

@@ -24,7 +24,7 @@ from .props import (
 
 
 def drink(r):
-    """A clear or coloured liquid, or none."""
+    """Returns a random liquid, clear or coloured, or None."""
     tints = [None, (0, 0, 0), (4, 30, 110), (9, 45, 160), (60, 90, 20), (3, 25, 25)]
     tint = pick(r, tints)
     return None if tint is None else b.glass("drink", r.uniform(1.33, 1.36), absorption=tint if any(tint) else None)
