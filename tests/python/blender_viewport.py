@@ -384,13 +384,14 @@ class Cameras(Installed):
 
     def test_a_picture_of_an_older_scene_is_never_taken_for_the_current_one(self):
         live = part_of_addon("live")
-        sent, seen = [], []
+        sent, seen, threads = [], [], []
 
         def send(command, **fields):
-            # Another thread looks while the command is on its way, as on a busy machine.
+            # Another thread looks while the command is on its way, or waits until it is sent.
             looks = threading.Thread(target=lambda: seen.append(state.is_current()))
             looks.start()
             looks.join(0.1)
+            threads.append(looks)
             sent.append(command)
             return len(sent)
 
@@ -407,6 +408,8 @@ class Cameras(Installed):
             if view > 2:
                 show(2)  # the last one of the older scene
             self.assertFalse(state.is_current())
+            for looks in threads:
+                looks.join()
             show(view)
             self.assertTrue(state.is_current())
         self.assertEqual(seen, [False] * 4)
