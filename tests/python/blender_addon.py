@@ -347,7 +347,8 @@ class Stops(Installed):
 
     def test_a_large_picture_stops_within_two_seconds(self):
         """The program would take longer to finish the picture. The last picture shown stays."""
-        self.scene.render.resolution_x, self.scene.render.resolution_y = 1600, 1200
+        self.scene.render.resolution_x, self.scene.render.resolution_y = 1000, 750
+        self.settings.method = "path"
         shown, pressed, ended = [], [], []
         engine, run = part_of_addon("engine").Engine, part_of_addon("run").Run
         show, stop, finish = engine._show, run.stop, run.finish

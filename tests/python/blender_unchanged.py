@@ -12,6 +12,7 @@ import numpy
 import bake
 import export
 import panorama
+import sky
 from lab.features import torture_stage
 
 
@@ -29,6 +30,7 @@ class Unchanged(support.Scratch):
         tree = self.stage.scene.world.node_tree
         self.sky = tree.nodes.new("ShaderNodeTexGradient")
         tree.links.new(self.sky.outputs["Color"], self.stage.background.inputs["Color"])
+        self.enterContext(mock.patch.object(sky.bake_world, "__defaults__", (64,)))
         for owner, name in ((bake.Baker, "_texels"), (panorama, "render")):
             self.enterContext(mock.patch.object(owner, name, self.counting(getattr(owner, name))))
 

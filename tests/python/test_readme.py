@@ -66,14 +66,18 @@ def anchors(page):
 
 
 def shortened(command):
-    """A command shortened to seconds, by time limits and the width of pictures."""
+    """A command shortened to seconds, by limits of time and iterations and the width of pictures."""
     command = re.sub(r"--time \S+", "--time 1", command)
-    if re.match(rf"{PROGRAM} (render|plan|converge)\b", command) and "--help" not in command:
-        command, widths = re.subn(r"--width \S+", "--width 64", command)
+    command = re.sub(r"--iterations \S+", "--iterations 4", command)
+    found = re.match(rf"{PROGRAM} (render|plan|converge)\b", command)
+    if found and "--help" not in command:
+        command, widths = re.subn(r"--width \S+", "--width 32", command)
         if not widths:
-            command += " --width 64"
+            command += " --width 32"
         if "--target-error" in command:
             command += " --iterations 8"
+        elif found[1] == "render" and "--time" not in command and "--iterations" not in command:
+            command += " --iterations 4"
     return command
 
 
