@@ -3,11 +3,14 @@
 The zip is installed as by a user, into a temporary repository of extensions.
 """
 
+import atexit
+import functools
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
+from pathlib import Path
 from unittest import mock
 
 import bmesh
@@ -20,21 +23,33 @@ import package
 
 _REPOSITORY = "caustique_test"
 ADDON = f"bl_ext.{_REPOSITORY}.caustique"
-#: A script that reads an EXR with OpenEXR's library, which Blender's Python lacks.
+#: A script that reads EXRs with OpenEXR's library, which Blender's Python lacks: lines of pairs of paths.
 _READER = """
 import sys, numpy, OpenEXR
-found = {}
-for part in OpenEXR.File(sys.argv[1], separate_channels=True).parts:
-    found.update((name, channel.pixels) for name, channel in part.channels.items())
-numpy.savez(sys.argv[2], **found)
+for line in iter(sys.stdin.readline, ""):
+    source, target = line.rstrip("\\n").split("\\t")
+    found = {}
+    for part in OpenEXR.File(source, separate_channels=True).parts:
+        found.update((name, channel.pixels) for name, channel in part.channels.items())
+    numpy.savez(target, **found)
+    print("read", flush=True)
 """
+
+
+@functools.cache
+def _reader():
+    """The process that reads EXRs: one for all tests. It ends with its input."""
+    python = support.ROOT / ".venv" / "bin" / "python"
+    return subprocess.Popen([python, "-c", _READER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
 
 def channels(path):
     """The channels of all parts of an EXR file, {name: pixels}."""
     with tempfile.NamedTemporaryFile(suffix=".npz") as file:
-        python = support.ROOT / ".venv" / "bin" / "python"
-        subprocess.run([python, "-c", _READER, path, file.name], check=True, timeout=120)
+        print(path, file.name, sep="\t", file=_reader().stdin, flush=True)
+        if _reader().stdout.readline() != "read\n":
+            _reader.cache_clear()
+            raise OSError(f"{path} cannot be read")
         with numpy.load(file.name) as found:
             return dict(found)
 
@@ -46,21 +61,20 @@ def part_of_addon(name):
 
 class Installed(support.Scratch):
     """Installs the add-on and makes it the engine of a scene. `stage` adds a lit plane and a glass ball, seen from
-    above."""
+    above. Tests share one installation and enable it anew, unless their class sets `installs`."""
+
+    installs = False
+    _shared = None
 
     def setUp(self):
         super().setUp()
         bpy.ops.wm.read_factory_settings(use_empty=True)
-        self.zip = self.dir / "caustique.zip"
-        package.build(str(self.zip), self.wheel())
-        self.repository = self.dir / "extensions"
-        repositories = bpy.context.preferences.extensions.repos
-        self.place = repositories.new(
-            name=_REPOSITORY, module=_REPOSITORY, custom_directory=str(self.repository))
-        self.addCleanup(repositories.remove, self.place)
-        self.before = self.registered()
-        bpy.ops.extensions.package_install_files(filepath=str(self.zip), repo=_REPOSITORY, enable_on_install=True)
-        self.addCleanup(self.uninstall)
+        if self.installs or Installed._shared is None:
+            self.install()
+        else:
+            self.place = self.add_repository(Installed._shared)
+            bpy.ops.preferences.addon_enable(module=ADDON)
+            self.addCleanup(self.disable)
         self.preferences = bpy.context.preferences.addons[ADDON].preferences
         self.preferences.program = str(support.binary())
         self.scene = bpy.context.scene
@@ -69,6 +83,35 @@ class Installed(support.Scratch):
         self.settings = self.scene.caustique_render
         self.settings.iterations, self.settings.method = 2, "vcm"
         self.layer = self.scene.view_layers[0]
+
+    def add_repository(self, folder):
+        """Add a repository of extensions in a folder to Blender's preferences. Returns it."""
+        self.repository = folder
+        repositories = bpy.context.preferences.extensions.repos
+        place = repositories.new(name=_REPOSITORY, module=_REPOSITORY, custom_directory=str(folder))
+        self.addCleanup(repositories.remove, place)
+        return place
+
+    def install(self):
+        """Install the package as a user does: for this test, or for this and later ones."""
+        folder = self.dir
+        if not self.installs:
+            folder = Path(tempfile.mkdtemp(prefix="caustique-"))
+            atexit.register(shutil.rmtree, folder, ignore_errors=True)
+            Installed._shared = folder / "extensions"
+        self.zip = folder / "caustique.zip"
+        package.build(str(self.zip), self.wheel())
+        self.place = self.add_repository(folder / "extensions")
+        self.before = self.registered()
+        bpy.ops.extensions.package_install_files(filepath=str(self.zip), repo=_REPOSITORY, enable_on_install=True)
+        self.addCleanup(self.uninstall if self.installs else self.disable)
+
+    def disable(self):
+        """Disable the add-on, and forget its modules."""
+        if ADDON in bpy.context.preferences.addons:
+            bpy.ops.preferences.addon_disable(module=ADDON)
+        for name in [name for name in sys.modules if name == ADDON or name.startswith(ADDON + ".")]:
+            del sys.modules[name]
 
     def wheel(self):
         """The wheel that the extension contains; None for none."""

@@ -172,7 +172,9 @@ class Messages(Installed):
     def test_faults_of_the_exporter_itself_are_named(self):
         self.stage()
         exporter = self.repository / "caustique" / "exporter" / "objects.py"
-        exporter.write_text(exporter.read_text().replace("class FlatScene:", "class FlatScene(1 / 0):"))
+        text = exporter.read_text()
+        self.addCleanup(exporter.write_text, text)  # the installation is shared
+        exporter.write_text(text.replace("class FlatScene:", "class FlatScene(1 / 0):"))
         self.assertRegex(self.fault(), r"could not be exported: ZeroDivisionError: .* Remedy: this is a fault of caustique's "
                                        r"exporter \(objects.py, line \d+\): report it with the scene")
 

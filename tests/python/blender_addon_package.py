@@ -13,6 +13,8 @@ from addon import ADDON, Installed, part_of_addon
 
 
 class Package(Installed):
+    installs = True
+
     def test_uninstalled_nothing_is_left(self):
         self.assertNotEqual(self.registered(), self.before)
         self.uninstall()

@@ -23,6 +23,8 @@ _METADATA = {
 
 
 class Wheel(Installed):
+    installs = True
+
     def setUp(self):
         # Blender extracts wheels below this folder.
         resources = self.enterContext(tempfile.TemporaryDirectory())

@@ -260,7 +260,7 @@ class Ends(Animation):
         handlers = bpy.app.handlers
         events = [(name, lambda name=name: [function(self.scene, None) for function in getattr(handlers, name)])
                   for name in ("render_init", "render_complete", "render_cancel")]
-        events += [("uninstalling", self.uninstall)]
+        events += [("disabling the add-on", self.disable)]
         for name, happen in events:
             job = part_of_addon("handoff").Job(self.scene, "ViewLayer", 1.0, str(self.dir), "")
             self.kept.export(job, lambda: False, lambda _: None)
