@@ -11,7 +11,7 @@ from mathutils import Matrix, Vector
 
 import panorama
 
-_PIXELS = 16  # per side of the picture below a sun; a picture around a lamp has twice as many across
+_PIXELS = 16  # height of the picture; a picture of all directions around a lamp is twice as wide
 _SAMPLES = 16
 
 

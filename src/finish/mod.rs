@@ -131,7 +131,7 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// The same pictures with the colours of lobes that a layer set of the frame has. Where a lobe's colour is black and the
+    /// These pictures, with the colours of lobes from the layers of the frame. Where a lobe's colour is black and the
     /// frame itself has no light in it, light of other frames is taken from it.
     #[must_use]
     pub fn with_colors_of(mut self, set: &LayerSet) -> Prepared {

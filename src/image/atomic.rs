@@ -76,7 +76,7 @@ pub fn remove_leftovers(path: &Path) {
 
 /// Whether a file has the name of a temporary file or a draft of the file `path`.
 pub fn is_temporary(file: &Path, path: &Path) -> bool {
-    // Most names are told by their first letters.
+    // Most names differ in their first letters.
     let is_hidden = file.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(PREFIX.as_bytes()));
     let Some(target) = resolve(path).ok().filter(|_| is_hidden) else { return false };
     let named = |suffix: &&str| file.file_name().is_some_and(|name| is_ours(name, &prefix(&target), suffix));

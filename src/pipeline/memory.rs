@@ -188,7 +188,7 @@ impl MemoryLimit {
         Ok((fitted, Some(format!("--memory {}: {less}", self.bytes >> 20))))
     }
 
-    /// Settings with as many photons as the limit has room for, and words that say so.
+    /// Settings with the largest number of photons that fits the limit, and a message with that number.
     ///
     /// # Errors
     /// The bytes that the render needs at least, which are more than the limit.

@@ -125,7 +125,7 @@ pub fn mix(mut z: u64) -> u64 {
 /// Increment between consecutive inputs of [`mix`]: 2^64 over the golden ratio \[Steele, Lea, Flood 2014\].
 pub const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// Independent uniform numbers, as many as needed, that are a function of a key.
+/// A sequence of independent uniform numbers, which is a function of a key.
 #[derive(Clone, Copy, Debug)]
 pub struct HashSequence(u64);
 

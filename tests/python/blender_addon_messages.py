@@ -54,7 +54,7 @@ class Messages(Installed):
     def test_a_program_that_is_too_old(self):
         self.stage()
         self.program("echo 'caustique 0.0.9 (commit 1a2b3c)'; echo Embree 4.4.0, /lib/libembree4.so.4")
-        self.assertIn("is version 0.0.9, and the add-on needs 0.1.0 or newer Remedy: update", self.fault())
+        self.assertIn("is version 0.0.9, and the add-on needs 0.2.0 or newer Remedy: update", self.fault())
 
     def test_a_program_that_is_another(self):
         self.stage()

@@ -16,7 +16,7 @@ import support
 from addon import ADDON, Installed, part_of_addon
 
 _METADATA = {
-    "METADATA": "Metadata-Version: 2.1\nName: caustique\nVersion: 0.1.0\n",
+    "METADATA": "Metadata-Version: 2.1\nName: caustique\nVersion: 0.2.0\n",
     "WHEEL": "Wheel-Version: 1.0\nRoot-Is-Purelib: false\nTag: cp310-abi3-manylinux_2_28_x86_64\n",
     "RECORD": "caustique/__init__.py,,\ncaustique/bin/caustique,,\n",
 }
@@ -39,12 +39,12 @@ class Wheel(Installed):
         given = os.environ.get("CAUSTIQUE_WHEEL")
         if given:
             return given
-        path = self.dir / "caustique-0.1.0-cp310-abi3-manylinux_2_28_x86_64.whl"
+        path = self.dir / "caustique-0.2.0-cp310-abi3-manylinux_2_28_x86_64.whl"
         with zipfile.ZipFile(path, "w") as archive:
             archive.writestr("caustique/__init__.py", "")
             archive.writestr("caustique/bin/caustique", f'#!/bin/sh\nexec "{support.binary()}" "$@"\n')
             for name, text in _METADATA.items():
-                archive.writestr(f"caustique-0.1.0.dist-info/{name}", text)
+                archive.writestr(f"caustique-0.2.0.dist-info/{name}", text)
         return str(path)
 
     def test_f12_renders_with_the_program_in_the_wheel(self):

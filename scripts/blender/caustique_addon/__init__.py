@@ -16,7 +16,7 @@ bl_info = {
     "name": "caustique",
     "author": "caustique",
     "description": "Renders the light that glass, water and mirrors focus",
-    "version": (0, 1, 0),
+    "version": (0, 2, 0),
     "blender": (3, 4, 0),
     "category": "Render",
     "support": "COMMUNITY",

@@ -11,7 +11,7 @@ import subprocess
 from .fault import Fault
 
 #: The oldest version whose command line is compatible with the add-on.
-OLDEST = (0, 1, 0)
+OLDEST = (0, 2, 0)
 HOW_TO_GET_IT = ("install the extension that contains the program, or clone the repository of caustique, run "
                  "./scripts/demo.sh there, and choose target/release/caustique in the add-on's preferences")
 _MAX_SECONDS = 60  # for an answer of the program

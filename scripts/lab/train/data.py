@@ -32,7 +32,7 @@ from ..record import ROOT
 
 SIDE = 128
 ITERATIONS = (8, 16, 32, 64, 128)
-# Most views stop after 32 iterations, so that the same time renders about twice as many views.
+# Most views stop after 32 iterations, so that more views are rendered in the same time.
 SHORT, LONG_SHARE, HELD_OUT_LONG_SHARE = 3, 1 / 8, 1 / 3
 # Camera paths per pixel of the noisy stacks, by seed: the paper has two; one takes 0.6 times as long.
 PATHS = {1: 2, 2: 1}
@@ -44,8 +44,8 @@ LEVELS = 5
 PHOTONS = 100_000
 # Additive parts, in the order in which the arrays hold them.
 PARTS = ("Emission", "Direct", "Indirect", "Caustic", "Volume")
-# Least and greatest width of the picture of which a window is rendered. The light paths of vcm are as many as its
-# camera paths, so a window of a large picture would have too few of them.
+# Least and greatest width of the picture of which a window is rendered. vcm traces one light path per camera path, so a
+# window of a large picture would get too few of them.
 WIDTHS = {"sppm": (320, 1920), "vcm": (240, 480)}
 # Core-seconds of a target's half. Training averages over the noise of many targets, but errors on held-out views are
 # estimated from few.

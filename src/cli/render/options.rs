@@ -80,7 +80,7 @@ pub struct RenderArgs {
     #[arg(long, value_enum, default_value_t = Form::Auto, help_heading = "Running")]
     #[serde(skip)]
     pub progress: Form,
-    /// Whether the outputs have their default names, of which the user is told.
+    /// Whether the outputs have their default names, which a message then gives.
     #[arg(skip)]
     #[serde(skip)]
     pub names_are_default: bool,

@@ -200,7 +200,7 @@ impl Settings {
         Settings { method, levels, guided: self.guided && method.supports_guiding(), ..self }
     }
 
-    /// Default number of light paths per iteration for a whole picture of this size: one per pixel, as many as camera
+    /// Default number of light paths per iteration for a whole picture of this size: one per pixel, as for camera
     /// paths, and in small pictures the number of the papers. If photons carry caustics alone, most of the error comes from
     /// camera paths, and guided light paths cost several times as much as unguided ones, because most of them hit glass.
     /// So their default is one per pixel in small pictures, too.

@@ -119,7 +119,7 @@ pub fn said() -> String {
     checkpoints(&mut said, folder);
     shards(&mut said, folder);
     stages(&mut said);
-    said.0.replace(&folder.display().to_string(), "DIR")
+    said.0.replace(&folder.display().to_string(), "DIR").replace(env!("CARGO_PKG_VERSION"), "VERSION")
 }
 
 #[test]

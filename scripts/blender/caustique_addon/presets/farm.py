@@ -1,4 +1,4 @@
-"""The same work on every machine: a number of iterations, and no limit that depends on the machine's speed."""
+"""A number of iterations and no other limit, so that the picture does not depend on the speed of the machine."""
 
 import bpy
 
