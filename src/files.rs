@@ -1,4 +1,4 @@
-//! Files that a user or a scene names: read without waiting for pipes and devices, and recognised under all their names.
+//! Files that users or scenes name: read without waiting for pipes and devices, and recognised under all their names.
 //!
 //! What depends on the operating system stands in its module `system`.
 

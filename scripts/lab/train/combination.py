@@ -178,7 +178,7 @@ class AffinitySums(torch.autograd.Function):
 
 
 class KernelSums(torch.autograd.Function):
-    """Computes the sums of `reference_kernel` by compiled code. Gradients do not flow into the argument `difference`."""
+    """Computes the sums of `reference_kernel` by compiled code. Gradients do not flow into `difference`."""
 
     @staticmethod
     def forward(ctx, weights, difference, window, dilation=1):
