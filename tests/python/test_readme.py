@@ -91,7 +91,7 @@ class Commands(support.Scratch):
         (self.dir / PROGRAM).parent.mkdir(parents=True)
         (self.dir / PROGRAM).symlink_to(support.binary().resolve())
         (self.dir / "out").mkdir()
-        demo = ["render", support.scene("pool"), "-o", "out/demo.exr", "--png", "out/demo.png", "--width", 64]
+        demo = ["render", support.scene("pool"), "-o", "out/demo.exr", "--png", "out/demo.png", "--width", 32]
         support.run([*demo, "--iterations", 8, "--progress", "none"], check=0, cwd=self.dir)
 
     def run_all(self, page):
