@@ -70,6 +70,8 @@ def shortened(command):
     command = re.sub(r"--time \S+", "--time 1", command)
     command = re.sub(r"--iterations \S+", "--iterations 4", command)
     found = re.match(rf"{PROGRAM} (render|plan|converge)\b", command)
+    if found and found[1] == "converge":
+        command = command.replace("--time 1", "--time 0.3")
     if found and "--help" not in command:
         command, widths = re.subn(r"--width \S+", "--width 32", command)
         if not widths:
