@@ -58,6 +58,7 @@ KNOWN = {
     "set": Argument(str, "first, second, all, or twins: scenes without features that other renderers' drivers lack"),
     "shots": Argument(names, "animated shots: pool, turntable, interior, gems"),
     "spp": Argument(int, "samples per pixel"),
+    "target": Argument(float, "relative error that stops a render"),
     "threads": Argument(int, "threads of a render"),
     "width": Argument(int, "width of the pictures, in pixels"),
 }
