@@ -25,6 +25,8 @@ mod generated;
 mod inputs;
 #[path = "cli/libraries.rs"]
 mod libraries;
+#[path = "cli/light.rs"]
+mod light;
 #[path = "cli/limits.rs"]
 mod limits;
 #[path = "cli/lobes.rs"]
