@@ -266,7 +266,7 @@ impl Guide {
         };
         let d = Frame::from_normal(axis).to_world(warp::cone_uniform(direction, one_minus_cos));
         if let Emitter::Triangle(triangle) = &lights.emitters()[emission.light as usize] {
-            let at = triangle.point(warp::triangle_uniform(point));
+            let at = triangle.at(warp::triangle_uniform(point));
             emission.origin = offset_origin(at, triangle.normal(), d, triangle.error);
         }
         lights.redirect(&mut emission, d)?;

@@ -1,21 +1,23 @@
 //! Light sources (emissive triangles, points, spots, suns and the environment), and their sampling.
 
 mod aim;
+mod bounds;
 mod bulb;
 mod cdf;
 mod cone;
 mod distribution;
 mod emission;
-mod emitter;
 mod environment;
 mod group;
 pub mod guide;
+mod kind;
 mod lights;
 mod picture;
 mod profile;
 mod receiver;
 mod region;
 mod sampler;
+mod sky;
 mod spot;
 mod spread;
 mod tree;
@@ -26,14 +28,18 @@ pub use cdf::Cdf;
 pub use cone::Cone;
 pub use distribution::{Distribution, Pattern, SpotCone};
 pub use emission::{DirectSample, EmissionDensity, EmissionSample, EntryDisc};
-pub use emitter::{Emitter, ShapedLight, Sky, TriangleLight, VolumeLight};
 pub use environment::{Environment, ImageEnvironment};
 pub use group::{Group, Groups, MAX_GROUP_NAME, MAX_GROUPS};
 pub use guide::Guide;
+pub use kind::{
+    Emitter, EnvironmentLight, Light, LightPlacement, Owner, PointLight, PunctualKind, ShapedLight, SpotLight,
+    SunLight, TriangleLight, VolumeLight,
+};
 pub use lights::Lights;
 pub use picture::Picture;
 pub use profile::Profile;
 pub use receiver::Receiver;
 pub use region::Region;
+pub use sky::Sky;
 pub use spot::SpotEdge;
 pub use spread::Spread;

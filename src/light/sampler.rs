@@ -1,11 +1,10 @@
 //! Selection of a light for next-event estimation at a receiver.
 
 use super::cdf::Cdf;
-use super::emitter::{Emitter, Sky, TriangleLight};
+use super::kind::{Emitter, Light, Owner};
 use super::receiver::Receiver;
+use super::sky::Sky;
 use super::tree::LightTree;
-use crate::math::luminance;
-use std::f32::consts::PI;
 
 /// Share of the probability of selecting a light that is proportional to power at every receiver. It limits how much
 /// probability a near light behind a wall can take from the other lights.
@@ -44,15 +43,8 @@ impl LightSampler {
     pub fn new(emitters: &[Emitter], sky: &Sky, powers: impl Iterator<Item = f64>) -> Option<LightSampler> {
         let power = Cdf::new(powers)?;
         let near = has_several_lights(emitters).then(|| LightTree::new(emitters)).flatten().map(|tree| {
-            let irradiance = |emitter: &Emitter| match emitter {
-                Emitter::Sun { irradiance, .. } => luminance(*irradiance),
-                Emitter::Environment => sky.environment.as_ref().map_or(0.0, |e| luminance(e.mean()) * PI),
-                _ => 0.0,
-            };
-            IrradianceSampler {
-                tree,
-                infinite: Cdf::new(emitters.iter().map(|emitter| f64::from(irradiance(emitter)))),
-            }
+            let irradiance = emitters.iter().map(|emitter| f64::from(emitter.irradiance(sky)));
+            IrradianceSampler { tree, infinite: Cdf::new(irradiance) }
         });
         Some(LightSampler { power, near })
     }
@@ -95,10 +87,7 @@ impl LightSampler {
 /// the receiver.
 fn has_several_lights(emitters: &[Emitter]) -> bool {
     match emitters {
-        [
-            Emitter::Triangle(TriangleLight { instance: a, .. }),
-            Emitter::Triangle(TriangleLight { instance: b, .. }),
-        ] => a != b,
+        [first, second] if matches!(first.owner(), Owner::Surface(_)) => first.owner() != second.owner(),
         _ => emitters.len() > 1,
     }
 }

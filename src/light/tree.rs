@@ -7,12 +7,10 @@
 //! the squared distance. A cluster that cannot light the receiver is never selected. In a small and distant cluster
 //! whose lights have similar axes, all lights are seen alike, so selection there is by power.
 
-mod bounds;
-
-use super::emitter::Emitter;
+use super::bounds::{Bounds, split, union};
+use super::kind::{Emitter, Light};
 use super::receiver::Receiver;
 use crate::math::Vec3;
-use bounds::{Bounds, split, union};
 use std::f32::consts::PI;
 use std::ops::Range;
 use wide::{CmpGe, CmpGt, CmpLe, CmpLt, f32x4};
@@ -192,8 +190,10 @@ pub(super) struct LightTree {
 impl LightTree {
     /// Builds the tree; `None` if no light has a finite position.
     pub fn new(emitters: &[Emitter]) -> Option<LightTree> {
-        let mut lights: Vec<(u32, Bounds)> =
-            (0..).zip(emitters).filter_map(|(i, emitter)| Some((i, Bounds::of(emitter)?))).collect();
+        let mut lights: Vec<(u32, Bounds)> = (0..)
+            .zip(emitters)
+            .filter_map(|(i, emitter)| Some((i, emitter.bounds().filter(Bounds::shines)?)))
+            .collect();
         let all = (union(&lights)?, 0..lights.len());
         let mut siblings = vec![Siblings::new(&[all], NONE)];
         let mut leaves = vec![NONE; emitters.len()];
@@ -323,8 +323,7 @@ fn parts(lights: &mut [(u32, Bounds)], range: Range<usize>, depth: u32) -> Vec<(
 mod tests {
     use super::*;
     use crate::light::SpotEdge;
-    use crate::light::emitter::spot_point;
-    use crate::light::{Spread, TriangleLight};
+    use crate::light::{EnvironmentLight, PointLight, SpotLight, Spread, TriangleLight};
     use crate::math::{Rgb, Vec2, Vec4, warp};
     use crate::random::{Domain, Purpose, Stream};
 
@@ -339,8 +338,8 @@ mod tests {
             let (p, radiance) = (vector(0) * 10.0, Rgb::splat(0.1 + draws(1).one(Purpose::Lobe)));
             let axis = warp::sphere_uniform(draws(2).two(Purpose::Pixel));
             match i % 4 {
-                0 => Emitter::Point { p, intensity: radiance },
-                1 => Emitter::Spot {
+                0 => PointLight { p, intensity: radiance }.into(),
+                1 => SpotLight {
                     p,
                     frame: crate::math::Frame::from_normal(axis),
                     intensity: radiance,
@@ -349,12 +348,13 @@ mod tests {
                     radius: if i % 8 == 1 { 0.3 } else { 0.0 },
                     edge: SpotEdge::Smooth,
                     bulb: None,
-                },
+                }
+                .into(),
                 _ => {
                     let corners = [p, vector(4) - 0.5, vector(5) - 0.5];
                     let normal = corners[1].cross(corners[2]);
                     let n = normal.normalize();
-                    Emitter::Triangle(TriangleLight {
+                    TriangleLight {
                         instance: 0,
                         primitive: i as u32,
                         area: 0.5 * normal.length(),
@@ -365,7 +365,8 @@ mod tests {
                         corners,
                         error: 0.0,
                         uniform: true,
-                    })
+                    }
+                    .into()
                 }
             }
         };
@@ -378,10 +379,9 @@ mod tests {
             Emitter::Triangle(TriangleLight { two_sided, plane, .. }) => {
                 *two_sided || plane.truncate().dot(p) - plane.w > 1e-4
             }
-            Emitter::Spot { p: at, radius, frame, outer, bulb, .. } => (0..16).any(|k| {
-                let u = Vec2::new((0.5 + k as f32) / 16.0, 0.99);
-                let at = spot_point((*at, *radius, *bulb), frame, u);
-                frame.n.dot((p - at).normalize()) > 1.0 - outer + 1e-4
+            Emitter::Spot(spot) => (0..16).any(|k| {
+                let (at, _) = spot.point(Vec2::new((0.5 + k as f32) / 16.0, 0.99)).unwrap();
+                spot.frame.n.dot((p - at).normalize()) > 1.0 - spot.outer + 1e-4
             }),
             _ => true,
         }
@@ -439,18 +439,18 @@ mod tests {
             }
         }
         assert!(shining > 30_000 && never > 3_000, "{shining} {never}");
-        let point = |x: f32| Emitter::Point { p: Vec3::new(x, 0.0, 0.0), intensity: Rgb::ONE };
+        let point = |x: f32| Emitter::from(PointLight { p: Vec3::new(x, 0.0, 0.0), intensity: Rgb::ONE });
         let tree = LightTree::new(&[point(0.0), point(10.0)]).unwrap();
         assert!((tree.pdf(&Receiver::anywhere(Vec3::X), 0) - 81.0 / 82.0).abs() < 1e-5);
     }
 
     #[test]
     fn coincident_lights_are_equally_probable_and_a_tree_needs_a_light() {
-        let light = Emitter::Point { p: Vec3::ONE, intensity: Rgb::ONE };
+        let light = Emitter::from(PointLight { p: Vec3::ONE, intensity: Rgb::ONE });
         let tree = LightTree::new(&vec![light; 1000]).unwrap();
         for p in [Vec3::ONE, Vec3::ZERO] {
             assert!((tree.pdf(&Receiver::anywhere(p), 17) - 1e-3).abs() < 1e-6);
         }
-        assert!(LightTree::new(&[Emitter::Environment]).is_none());
+        assert!(LightTree::new(&[EnvironmentLight.into()]).is_none());
     }
 }

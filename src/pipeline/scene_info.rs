@@ -1,6 +1,6 @@
 //! Objects, materials, lights and the rest of a scene as JSON, for `caustique info --json` and Python's `Scene.info`.
 
-use crate::light::{Emitter, Pattern};
+use crate::light::Light;
 use crate::math::Vec3;
 use crate::scene::Scene;
 use crate::scene::description::FileContents;
@@ -17,9 +17,8 @@ pub fn scene_info(path: &Path, scene: &Scene) -> Value {
     let textures = textures.map(|t| json!({"name": t.name, "width": t.width, "height": t.height}));
     let mut lights = Map::new();
     for emitter in scene.lights.emitters() {
-        let kind = kind(emitter);
-        let count = lights.get(kind).and_then(Value::as_u64).unwrap_or(0);
-        lights.insert(kind.into(), (count + 1).into());
+        let count = lights.get(emitter.name()).and_then(Value::as_u64).unwrap_or(0);
+        lights.insert(emitter.name().into(), (count + 1).into());
     }
     let FileContents { scenes, scene: shown, animations, variants, extensions } = &scene.contents;
     json!({
@@ -68,20 +67,4 @@ fn light_names(scene: &Scene) -> Vec<String> {
 fn dimensions(scene: &Scene) -> [f32; 3] {
     let (low, high) = scene.shapes.bounds();
     (high - low).max(Vec3::ZERO).to_array()
-}
-
-fn kind(emitter: &Emitter) -> &'static str {
-    match emitter {
-        Emitter::Point { .. } => "point",
-        Emitter::Spot { .. } => "spot",
-        Emitter::Shaped(shaped) => match (&**shaped.distribution.pattern(), shaped.distribution.cone()) {
-            (Pattern::Profile(_), None) => "point with a profile",
-            (Pattern::Profile(_), Some(_)) => "spot with a profile",
-            (Pattern::Picture(_), _) => "spot with a picture",
-        },
-        Emitter::Volume(_) => "emissive medium",
-        Emitter::Sun { .. } => "sun",
-        Emitter::Environment => "environment",
-        _ => "emissive triangles",
-    }
 }

@@ -1,6 +1,6 @@
 //! Names of materials, objects and lights in reasons and warnings; long lists are truncated.
 
-use crate::light::Emitter;
+use crate::light::{Emitter, Light};
 use crate::material::Material;
 use crate::scene::Scene;
 use std::collections::HashSet;

@@ -3,6 +3,7 @@
 use super::effect::Effect;
 use super::names::{UsedMaterial, lights, truncate_names, truncate_reasons, used_in_scene};
 use crate::camera::Camera;
+use crate::light::Light;
 use crate::material::{Alpha, Material};
 use crate::scene::Scene;
 

@@ -1,16 +1,16 @@
 //! Building a scene from a description: places and bakes meshes, makes lights, commits shapes to Embree.
 
-use super::description::{self, Description, EnvironmentSource, PunctualKind, PunctualLight};
+use super::description::{self, Description, EnvironmentSource, PunctualLight};
 use super::nesting::{Volumes, alpha_solids};
 use super::{Contacts, Scene, SolidStacks, Survey, dense};
 use crate::error::Result;
 use crate::geometry::{Instance, Mesh, Placement, Shapes};
 use crate::light::{
-    Bulb, Distribution, Emitter, Environment, Group, Groups, ImageEnvironment, Lights, MAX_GROUP_NAME, MAX_GROUPS,
-    Pattern, ShapedLight, Sky, SpotCone,
+    Bulb, Distribution, Emitter, Environment, Group, Groups, ImageEnvironment, Light, LightPlacement, Lights,
+    MAX_GROUP_NAME, MAX_GROUPS, Pattern, PointLight, ShapedLight, Sky, SpotCone,
 };
 use crate::material::{Alpha, Material, Materials, MediumParameters, Scattering};
-use crate::math::{DAffine3, DVec3, Frame, Rgb, Vec3, bounding_box};
+use crate::math::{DAffine3, DVec3, Rgb, Vec3, bounding_box};
 use crate::texture::Texture;
 use crate::trace::{CAMERA_RAY_BIT, HitFilter, Tracer};
 use std::sync::Arc;
@@ -238,7 +238,7 @@ fn warn_of_lights(
         }
     }
     let opaque = medium.is_some_and(|medium| medium.transmittance(f32::INFINITY) == Rgb::ZERO);
-    if opaque && lights.emitters().iter().any(Emitter::is_infinite) {
+    if opaque && lights.emitters().iter().any(Light::is_infinite) {
         warnings.push(
             "the scene's medium has no end: no light of suns and environments gets through it (give a mesh around the \
              scene the medium instead)"
@@ -460,15 +460,6 @@ fn environment(described: Option<description::EnvironmentDescription>) -> Option
     }
 }
 
-fn axis(light: &PunctualLight) -> Vec3 {
-    (light.to_world.matrix3 * DVec3::NEG_Z).normalize_or(DVec3::NEG_Y).as_vec3()
-}
-
-/// 1 minus the cosine of an angle (radians), exact for small angles.
-fn one_minus_cos(angle: f64) -> f64 {
-    2.0 * (0.5 * angle).sin().powi(2)
-}
-
 /// The distributions of the lights of a scene, which lights with equal patterns and cones share.
 #[derive(Default)]
 pub(super) struct Distributions(Vec<KnownDistribution>);
@@ -498,63 +489,21 @@ impl Distributions {
     }
 }
 
-/// The emitter of a point or a spot with a pattern. Without any light it is a point of no intensity.
-fn shaped(light: &PunctualLight, p: Vec3, pattern: &Arc<Pattern>, distributions: &mut Distributions) -> Emitter {
-    let cone = match light.kind {
-        PunctualKind::Spot { inner, outer, edge } => {
-            let [inner, outer] = cone_sizes(inner, outer);
-            Some(SpotCone { inner, outer, edge })
-        }
-        _ => None,
-    };
-    let Some(distribution) = distributions.get(pattern, cone) else {
-        return Emitter::Point { p, intensity: Rgb::ZERO };
-    };
-    let right = (light.to_world.matrix3 * DVec3::X).normalize_or(DVec3::X).as_vec3();
-    let frame = Frame::from_normal_tangent(axis(light), right);
-    let (radius, intensity, bulb) = (light.radius, light.intensity, bulb(light));
-    Emitter::Shaped(ShapedLight { p, radius, frame, intensity, distribution, bulb })
-}
-
-/// The bulb of a spot or of a light with a pattern, if it has a visible one.
-fn bulb(light: &PunctualLight) -> Option<Bulb> {
-    (light.bulb && light.radius > 0.0).then_some(Bulb { hidden_from_camera: light.hidden_from_camera })
-}
-
-/// 1 minus the cosines of the half angles of a spot's cone (radians); the second is greater, so that the ramp between
-/// them has a width.
-fn cone_sizes(inner: f32, outer: f32) -> [f32; 2] {
-    let [inner, outer] = [inner, outer].map(|angle| one_minus_cos(f64::from(angle)));
-    [inner as f32, outer.max(inner * (1.0 + 1e-6)) as f32]
-}
-
-/// The emitter of a punctual light that is not a sphere.
+/// The emitter of a punctual light that is not a sphere. A pattern without any light makes it a point of no intensity.
 pub(super) fn punctual(light: &PunctualLight, origin: DVec3, distributions: &mut Distributions) -> Emitter {
-    let p = (light.to_world.translation - origin).as_vec3();
-    if let Some(pattern) = &light.pattern {
-        return shaped(light, p, pattern, distributions);
-    }
-    match light.kind {
-        PunctualKind::Point => Emitter::Point { p, intensity: light.intensity },
-        PunctualKind::Spot { inner, outer, edge } => {
-            let [inner, outer] = cone_sizes(inner, outer);
-            Emitter::Spot {
-                p,
-                radius: light.radius,
-                frame: Frame::from_normal(axis(light)),
-                intensity: light.intensity,
-                inner,
-                outer,
-                edge,
-                bulb: bulb(light),
-            }
-        }
-        PunctualKind::Sun { angle } => Emitter::Sun {
-            frame: Frame::from_normal(-axis(light)),
-            irradiance: light.intensity,
-            one_minus_cos: one_minus_cos(0.5 * f64::from(angle)) as f32,
-            hidden_from_camera: light.hidden_from_camera,
-        },
+    let place = LightPlacement {
+        p: (light.to_world.translation - origin).as_vec3(),
+        axis: (light.to_world.matrix3 * DVec3::NEG_Z).normalize_or(DVec3::NEG_Y).as_vec3(),
+        right: (light.to_world.matrix3 * DVec3::X).normalize_or(DVec3::X).as_vec3(),
+        intensity: light.intensity,
+        radius: light.radius,
+        bulb: (light.bulb && light.radius > 0.0).then_some(Bulb { hidden_from_camera: light.hidden_from_camera }),
+        hidden_from_camera: light.hidden_from_camera,
+    };
+    match light.pattern.as_ref().map(|pattern| distributions.get(pattern, light.kind.cone())) {
+        None => light.kind.emitter(&place),
+        Some(Some(distribution)) => ShapedLight::new(&place, distribution).into(),
+        Some(None) => PointLight { p: place.p, intensity: Rgb::ZERO }.into(),
     }
 }
 

@@ -2,7 +2,8 @@
 
 use crate::error::{Error, ErrorKind};
 use crate::geometry::Mesh;
-use crate::light::{Pattern, SpotEdge};
+use crate::light::Pattern;
+pub use crate::light::PunctualKind;
 use crate::material::{Material, MediumParameters};
 use crate::math::{DAffine3, DVec3, Rgb, bounding_box_f64};
 use crate::texture::Texture;
@@ -284,27 +285,6 @@ pub struct GuessedUnits {
     pub photometric: bool,
     /// The reason for the guess, as a part of a message.
     pub from: String,
-}
-
-/// Kind of a punctual light.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum PunctualKind {
-    /// A point light of equal intensity in all directions.
-    Point,
-    /// A spot, which emits into a cone with a soft edge.
-    Spot {
-        /// Half angle of the cone of full intensity (radians).
-        inner: f32,
-        /// Half angle of the cone outside which the intensity is zero (radians).
-        outer: f32,
-        /// Falloff of the intensity between `inner` and `outer`.
-        edge: SpotEdge,
-    },
-    /// A sun: light from infinity, from a cone of directions.
-    Sun {
-        /// Angular diameter of the sun (radians); 0 is exactly parallel light.
-        angle: f32,
-    },
 }
 
 /// Light from all directions at infinity, as the scene file describes it.

@@ -32,7 +32,7 @@ pub use view::View;
 
 use crate::error::Result;
 use crate::geometry::{Shapes, Surface};
-use crate::light::{Emitter, Environment, Lights, TriangleLight, VolumeLight};
+use crate::light::{Environment, Light, Lights, Owner};
 use crate::material::{Materials, MediumParameters, Scattering};
 use crate::math::{DVec3, Vec3};
 use crate::trace::Tracer;
@@ -159,14 +159,14 @@ impl Scene {
     /// The name of a light in messages: `light "Sun"`, or `object "Panel"` for an emissive triangle or
     /// medium of the object.
     pub fn light_name(&self, index: usize) -> String {
-        match &self.lights.emitters()[index] {
-            Emitter::Triangle(TriangleLight { instance, .. }) | Emitter::Volume(VolumeLight { instance, .. }) => {
-                let instance = &self.shapes.instances[*instance as usize];
+        match self.lights.emitters()[index].owner() {
+            Owner::Surface(instance) | Owner::Medium(instance) => {
+                let instance = &self.shapes.instances[instance as usize];
                 let kind = if instance.object < self.first_light_sphere { "object" } else { "light" };
                 format!("{kind} \"{}\"", instance.name)
             }
-            Emitter::Environment => "the environment".into(),
-            Emitter::Point { .. } | Emitter::Spot { .. } | Emitter::Shaped(_) | Emitter::Sun { .. } => {
+            Owner::Environment => "the environment".into(),
+            Owner::Light => {
                 let environment = usize::from(self.lights.sky().environment.is_some());
                 let first = self.lights.emitters().len() - environment - self.light_names.len();
                 format!("light \"{}\"", self.light_names[index - first])

@@ -1,7 +1,7 @@
 //! Kinds of things that a scene contains.
 
 use crate::geometry::Shapes;
-use crate::light::{Emitter, Lights};
+use crate::light::{Light, Lights};
 use crate::material::{Alpha, Materials, MediumParameters};
 
 /// Which kinds of things a scene contains; each field is true if there is at least one.
@@ -98,7 +98,7 @@ impl Survey {
         for emitter in lights.emitters() {
             survey.delta_lights |= emitter.is_delta();
             survey.glints |= perfect && sharp && !emitter.is_delta();
-            survey.infinite_lights |= matches!(emitter, Emitter::Sun { .. } | Emitter::Environment);
+            survey.infinite_lights |= emitter.is_infinite();
         }
         survey
     }

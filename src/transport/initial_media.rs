@@ -2,7 +2,7 @@
 
 use super::interior::Interior;
 use crate::camera::Camera;
-use crate::light::{Emitter, TriangleLight};
+use crate::light::{Emitter, Light, TriangleLight};
 use crate::math::{Vec3, bounding_box};
 use crate::scene::Scene;
 use std::collections::HashMap;

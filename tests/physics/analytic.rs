@@ -8,7 +8,7 @@
 use crate::support;
 
 use caustique::estimator::InitialBandwidth;
-use caustique::light::Emitter;
+use caustique::light::Light;
 use caustique::material::{Alpha, Material, MediumParameters};
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
 use caustique::random::{Domain, Stream};
@@ -265,7 +265,7 @@ fn cut_outs_and_matched_boundaries_are_no_bounces() {
         description.lights.push(point_light(DVec3::new(0.0, 2.0, 0.0), intensity));
         description.cameras.push(look_at(DVec3::new(0.0, 0.5, 0.0), DVec3::ZERO, 0.5));
         let scene = build(description);
-        assert!(scene.lights.emitters().iter().all(Emitter::is_delta));
+        assert!(scene.lights.emitters().iter().all(Light::is_delta));
         let expected = f64::from(rho * intensity) / std::f64::consts::PI / 4.0 * factor;
         let check = Check { expected, bias: 1e-4, detects: 0.03 };
         let settings = settings(100, 1000, 0.05);

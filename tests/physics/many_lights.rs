@@ -2,7 +2,7 @@
 
 use crate::support;
 
-use caustique::light::{DirectSample, Receiver};
+use caustique::light::{DirectSample, Light, Receiver};
 use caustique::math::{DVec3, Rgb, Vec3};
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::scene::Scene;

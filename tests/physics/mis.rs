@@ -13,7 +13,7 @@ use crate::support;
 use bumpalo::Bump;
 use caustique::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use caustique::camera::Camera;
-use caustique::light::{EmissionDensity, Emitter, Receiver, TriangleLight};
+use caustique::light::{EmissionDensity, Emitter, Light, Receiver, TriangleLight};
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec3};
 use caustique::medium::{FlightDensity, HenyeyGreenstein};
@@ -803,7 +803,7 @@ fn check_samples(what: &str, scene: &Scene, radius: f32, paths: u32, samples: Sa
             // The triangles of a lamp have equal probabilities for emission and for next-event estimation.
             Bug::Chosen => {
                 let emitters = scene.lights.emitters();
-                emitters.len() > 1 && emitters.iter().any(Emitter::is_infinite)
+                emitters.len() > 1 && emitters.iter().any(Light::is_infinite)
             }
             _ => true,
         };

@@ -7,7 +7,7 @@
 use crate::support;
 
 use caustique::estimator::InitialBandwidth;
-use caustique::light::{Pattern, Picture, Profile, Receiver, SpotEdge};
+use caustique::light::{Light, Pattern, Picture, Profile, Receiver, SpotEdge};
 use caustique::math::{DAffine3, DMat3, DVec3, Rgb, Vec2, Vec3};
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::render::{Control, Method, Settings, render};

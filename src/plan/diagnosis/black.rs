@@ -3,12 +3,12 @@
 use super::super::{EffectPlan, PlanRequest};
 use super::{lights, rays};
 use crate::camera::Camera;
-use crate::light::Emitter;
+use crate::light::Light;
 use crate::scene::Scene;
 
 /// A warning if the camera sees no surface, no scattering medium and no light at infinity; otherwise `None`.
 pub(super) fn empty_view(scene: &Scene, camera: &Camera) -> Option<String> {
-    let shows_more = scene.survey.scattering || scene.lights.emitters().iter().any(Emitter::is_infinite);
+    let shows_more = scene.survey.scattering || scene.lights.emitters().iter().any(Light::is_infinite);
     (!shows_more && !sees_anything(scene, camera)).then(|| {
         "the camera sees no surface, so the picture will be black; look at its place and direction, or choose another with --camera".into()
     })

@@ -4,8 +4,8 @@ use super::super::names::truncate_names;
 use super::super::{Effect, PlanRequest};
 use super::rays;
 use crate::camera::Camera;
-use crate::light::{Emitter, ShapedLight, TriangleLight};
-use crate::math::{Rgb, Vec3, bounding_box, luminance, one_minus_cos};
+use crate::light::{Emitter, Light, Owner, TriangleLight};
+use crate::math::{Vec3, bounding_box, luminance};
 use crate::scene::Scene;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f32::consts::PI;
@@ -33,14 +33,14 @@ pub(super) fn wrong_units(scene: &Scene) -> Option<String> {
     let sky = scene.lights.sky();
     let (mut points, mut surfaces, mut suns) = (0.0, 0.0, 0.0);
     for emitter in scene.lights.emitters() {
-        match emitter {
-            Emitter::Triangle(TriangleLight { instance, .. }) => {
-                let own = scene.shapes.instances[*instance as usize].object < scene.first_light_sphere;
+        match emitter.owner() {
+            Owner::Surface(instance) => {
+                let own = scene.shapes.instances[instance as usize].object < scene.first_light_sphere;
                 *if own { &mut surfaces } else { &mut points } += emitter.power(sky) as f32;
             }
-            Emitter::Point { .. } | Emitter::Spot { .. } | Emitter::Shaped(_) => points += emitter.power(sky) as f32,
-            Emitter::Sun { irradiance, .. } => suns += luminance(*irradiance),
-            Emitter::Environment | Emitter::Volume(_) => {}
+            Owner::Light if emitter.is_infinite() => suns += emitter.irradiance(sky),
+            Owner::Light => points += emitter.power(sky) as f32,
+            Owner::Medium(_) | Owner::Environment => {}
         }
     }
     let alone = surfaces == 0.0 && sky.environment.is_none() && points + suns > 0.0;
@@ -91,21 +91,14 @@ fn light_rays(scene: &Scene) -> Vec<LightRays> {
     let mut glowing: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     let sky = scene.lights.sky();
     for (index, emitter) in scene.lights.emitters().iter().enumerate().filter(|(_, e)| e.power(sky) > 0.0) {
-        let from = |p: Vec3, shines: &dyn Fn(&Vec3) -> bool| LightRays {
-            name: scene.light_name(index),
-            object: None,
-            rays: rays::directions(DIRECTIONS).filter(shines).map(|d| (p, d)).collect(),
-        };
-        match emitter {
-            Emitter::Point { p, .. } => sources.push(from(*p, &|_| true)),
-            Emitter::Spot { p, frame, outer, .. } => {
-                sources.push(from(*p, &|d| one_minus_cos(*d, frame.n) < *outer));
-            }
-            Emitter::Shaped(ShapedLight { p, frame, distribution, .. }) => {
-                sources.push(from(*p, &|d| distribution.relative(frame.to_local(*d)) != Rgb::ZERO));
-            }
-            Emitter::Triangle(TriangleLight { instance, .. }) => glowing.entry(*instance).or_default().push(index),
-            Emitter::Sun { .. } | Emitter::Environment | Emitter::Volume(_) => {}
+        match emitter.owner() {
+            Owner::Light => sources.extend(emitter.any_point(&scene.shapes).map(|p| LightRays {
+                name: scene.light_name(index),
+                object: None,
+                rays: rays::directions(DIRECTIONS).filter(|d| emitter.shines(*d)).map(|d| (p, d)).collect(),
+            })),
+            Owner::Surface(instance) => glowing.entry(instance).or_default().push(index),
+            Owner::Medium(_) | Owner::Environment => {}
         }
         if sources.len() >= MAX_LIGHTS {
             break;
@@ -149,7 +142,7 @@ pub(super) fn encased_lights(scene: &Scene, camera: Vec3) -> Vec<String> {
 /// A warning if the environment or suns cannot light the surroundings of the camera, or the surfaces that it sees from
 /// outside, because a sky dome or a closed room blocks them.
 pub(super) fn blocked_environment(scene: &Scene, camera: &Camera) -> Option<String> {
-    let has_sun = scene.lights.emitters().iter().any(|emitter| matches!(emitter, Emitter::Sun { .. }));
+    let has_sun = scene.lights.others().any(Light::is_infinite);
     let lights = match (&scene.lights.sky().environment, has_sun) {
         (Some(_), false) => "the environment lights",
         (Some(_), true) => "the environment and the sun light",

@@ -4,7 +4,6 @@
 use super::super::names::truncate_names;
 use super::rays;
 use crate::geometry::Surface;
-use crate::light::Emitter;
 use crate::scene::Scene;
 use crate::stat::median;
 use std::collections::BTreeSet;
@@ -18,10 +17,7 @@ const MAX_ANGLE: f32 = 10.0;
 /// A warning that names the matte objects whose faces are turned away from their shading normals, if a light without size,
 /// whose shadows have sharp edges, shines on the scene.
 pub(in super::super) fn stepped_shadows(scene: &Scene) -> Option<String> {
-    let sharp = |light: &Emitter| {
-        matches!(light, Emitter::Point { .. } | Emitter::Spot { .. } | Emitter::Sun { .. } | Emitter::Shaped(_))
-    };
-    if !scene.lights.emitters().iter().any(sharp) {
+    if scene.lights.others().next().is_none() {
         return None;
     }
     let mut objects = BTreeSet::new();

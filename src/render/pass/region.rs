@@ -2,7 +2,7 @@
 //! scene; without a region to aim at, few of them would arrive where the camera looks.
 
 use crate::camera::{par_pixels, pixels_per_band};
-use crate::light::Region;
+use crate::light::{Light, Region};
 use crate::math::Vec3;
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;

@@ -1,8 +1,6 @@
 //! Bounds on the positions and directions of lights, and the best split of a cluster into halves.
 
-use crate::light::emitter::{Emitter, ShapedLight, TriangleLight};
-use crate::light::profile::polar_angle;
-use crate::math::{Vec3, luminance};
+use crate::math::Vec3;
 use std::f32::consts::PI;
 
 /// Number of buckets along an axis of a cluster of lights; the borders between them are tried as splits.
@@ -29,47 +27,21 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// Bounds of one light; `None` for lights at infinity and lights without intensity.
-    pub fn of(emitter: &Emitter) -> Option<Bounds> {
-        let at = |p: Vec3, axis, spread, reach, intensity| Bounds {
-            low: p,
-            high: p,
-            axis,
-            spread,
-            reach,
-            two_sided: false,
-            cosine: false,
-            intensity,
-        };
-        let bounds = match emitter {
-            Emitter::Triangle(TriangleLight { area, two_sided, radiance, spread, plane, corners, .. }) => {
-                let [a, b, c] = [corners[0], corners[0] + corners[1], corners[0] + corners[2]];
-                let intensity = luminance(*radiance) * area * spread.relative_radiance(1.0);
-                let bounds = at(a, plane.truncate(), 0.0, 0.5 * PI, intensity);
-                Bounds { low: a.min(b).min(c), high: a.max(b).max(c), two_sided: *two_sided, cosine: true, ..bounds }
-            }
-            Emitter::Point { p, intensity } => at(*p, Vec3::Z, PI, 0.5 * PI, luminance(*intensity)),
-            Emitter::Spot { p, radius, frame, intensity, outer, .. } => {
-                // 1 - cos(x) = 2 sin^2(x / 2).
-                let reach = 2.0 * (0.5 * outer).clamp(0.0, 1.0).sqrt().asin();
-                let (low, high) = (p - *radius, p + *radius);
-                Bounds { low, high, ..at(*p, frame.n, 0.0, reach, luminance(*intensity)) }
-            }
-            Emitter::Shaped(ShapedLight { p, radius, frame, intensity, distribution, .. }) => {
-                let reach = polar_angle(distribution.reach());
-                // The bound of wide lights must not depend on rounding at the back of the axis.
-                let (axis, spread) = if reach < 3.0 { (frame.n, 0.0) } else { (Vec3::Z, PI) };
-                let (low, high) = (p - *radius, p + *radius);
-                let brightest = luminance(*intensity) * distribution.peak();
-                Bounds { low, high, ..at(*p, axis, spread, reach.min(3.0), brightest) }
-            }
-            Emitter::Volume(volume) => {
-                let [low, high] = volume.bounds();
-                Bounds { low, high, ..at(low, Vec3::Z, PI, 0.5 * PI, luminance(volume.intensity())) }
-            }
-            Emitter::Sun { .. } | Emitter::Environment => return None,
-        };
-        (bounds.intensity > 0.0 && bounds.intensity.is_finite()).then_some(bounds)
+    /// Bounds of a point that emits around `axis` as far as the angle `reach` (rad), with the luminance `intensity` of its
+    /// maximum radiant intensity (W/sr). `spread` is the maximum angle between `axis` and the light's own axis (rad).
+    pub fn of_point(p: Vec3, (axis, spread): (Vec3, f32), reach: f32, intensity: f32) -> Bounds {
+        Bounds { low: p, high: p, axis, spread, reach, two_sided: false, cosine: false, intensity }
+    }
+
+    /// These bounds, extended to the box from `low` to `high`.
+    #[must_use]
+    pub fn with_box(self, [low, high]: [Vec3; 2]) -> Bounds {
+        Bounds { low, high, ..self }
+    }
+
+    /// Whether the tree can hold a light with these bounds.
+    pub fn shines(&self) -> bool {
+        self.intensity > 0.0 && self.intensity.is_finite()
     }
 
     pub fn center(&self) -> Vec3 {

@@ -1,0 +1,89 @@
+//! The environment as a light.
+
+use super::{Light, LightRay, Owner, SceneParts, Selected};
+use crate::geometry::Shapes;
+use crate::light::bounds::Bounds;
+use crate::light::environment::EnvironmentSample;
+use crate::light::{Cone, DirectSample, EmissionSample, Sky};
+use crate::math::{Rgb, Vec2, Vec3, luminance};
+use std::f32::consts::PI;
+
+/// The environment (image or uniform colour) at infinity, stored in [`Sky`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct EnvironmentLight;
+
+impl Light for EnvironmentLight {
+    fn name(&self) -> &'static str {
+        "environment"
+    }
+
+    fn owner(&self) -> Owner {
+        Owner::Environment
+    }
+
+    fn power(&self, sky: &Sky) -> f64 {
+        let mean = sky.environment.as_ref().map_or(0.0, |environment| f64::from(luminance(environment.mean())));
+        mean * (4.0 * std::f64::consts::PI) * sky.disc_area()
+    }
+
+    fn irradiance(&self, sky: &Sky) -> f32 {
+        sky.environment.as_ref().map_or(0.0, |environment| luminance(environment.mean()) * PI)
+    }
+
+    fn bounds(&self) -> Option<Bounds> {
+        None
+    }
+
+    #[inline]
+    fn is_delta(&self) -> bool {
+        false
+    }
+
+    #[inline]
+    fn is_infinite(&self) -> bool {
+        true
+    }
+
+    fn any_point(&self, _: &Shapes) -> Option<Vec3> {
+        None
+    }
+
+    fn shines(&self, _: Vec3) -> bool {
+        true
+    }
+
+    #[inline]
+    fn point(&self, _: Vec2) -> Option<(Vec3, Option<Cone>)> {
+        None
+    }
+
+    #[inline]
+    fn sample(&self, scene: &SceneParts, _: Vec3, selected: Selected, u: Vec2) -> Option<DirectSample> {
+        let EnvironmentSample { wi, pdf_w, radiance } = scene.sky.environment.as_ref()?.sample(u)?;
+        let sample = selected.infinite(wi, radiance, pdf_w, false);
+        (sample.pdf_w > 0.0).then_some(sample)
+    }
+
+    #[inline]
+    fn emit(&self, scene: &SceneParts, _: bool, point: Vec2, direction: Vec2) -> Option<LightRay> {
+        let EnvironmentSample { wi, pdf_w: start, radiance } = scene.sky.environment.as_ref()?.sample(direction)?;
+        let (origin, onward) = scene.sky.sample_disc(point, -wi);
+        Some(LightRay { origin, direction: -wi, flux: radiance / (start * onward), start, onward, cos: 1.0 })
+    }
+
+    #[inline]
+    fn density(&self, _: Vec3) -> Option<(f32, f32)> {
+        None
+    }
+
+    #[inline]
+    fn redirected_flux(&self, _: &EmissionSample, _: Vec3, _: (f32, f32)) -> Option<Rgb> {
+        None
+    }
+
+    #[inline]
+    fn arriving(&self, sky: &Sky, d: Vec3, camera: bool) -> Option<(Rgb, f32)> {
+        let seen = !(camera && sky.hidden_from_camera);
+        sky.environment.as_ref().filter(|_| seen).map(|environment| environment.radiance_and_pdf_w(d))
+    }
+}

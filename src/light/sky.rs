@@ -1,0 +1,39 @@
+//! The surroundings of a scene.
+
+use super::Environment;
+use crate::math::{Frame, Vec2, Vec3, warp};
+use std::f32::consts::PI;
+
+/// The bounding sphere of the scene, and the environment around it.
+#[derive(Clone, Debug)]
+pub struct Sky {
+    /// Centre of the scene's bounding sphere (m).
+    pub center: Vec3,
+    /// Radius of the scene's bounding sphere (m).
+    pub radius: f32,
+    /// The light from all directions around the scene; `None` if the scene has no environment.
+    pub environment: Option<Environment>,
+    /// Whether camera rays do not see the environment, although it lights the scene.
+    pub hidden_from_camera: bool,
+}
+
+impl Sky {
+    /// Area of the disc through which light from one direction enters the scene's bounding sphere (m2).
+    pub(super) fn disc_area(&self) -> f64 {
+        std::f64::consts::PI * f64::from(self.radius) * f64::from(self.radius)
+    }
+
+    /// Density per area (1/m2) of the points that [`Sky::sample_disc`] samples.
+    #[inline]
+    pub(super) fn disc_pdf_a(&self) -> f32 {
+        1.0 / (PI * self.radius * self.radius)
+    }
+
+    /// Samples a point of the disc perpendicular to `d`, as wide as the scene's bounding sphere, through which light of
+    /// direction `d` enters the scene. Returns it with its density per area.
+    pub(super) fn sample_disc(&self, u: Vec2, d: Vec3) -> (Vec3, f32) {
+        let frame = Frame::from_normal(d);
+        let q = warp::disc_concentric(u) * self.radius;
+        (self.center + frame.t * q.x + frame.b * q.y - d * self.radius, self.disc_pdf_a())
+    }
+}
