@@ -60,7 +60,7 @@ impl TriangleLight {
             coat = 0.0;
         }
         if material.clearcoat_ior_texture.is_none() {
-            coat_ior = material.clearcoat_ior;
+            coat_ior = material.clearcoat_ior.factor;
         }
         let textured = material.has_textured_emission();
         let uniform = !textured && matches!(material.alpha, Alpha::Opaque);
