@@ -107,7 +107,7 @@ impl Material {
             p.clearcoat_eta = self.coat_ior(surface, textures);
             p.clearcoat_color = self.clearcoat_color.at(surface, textures);
         }
-        if self.sheen_color.max_element() > 0.0 {
+        if self.sheen_color.factor.max_element() > 0.0 {
             p.sheen_color = self.sheen_color.at(surface, textures);
             p.sheen_alpha = sqr(self.sheen_roughness.at(surface, textures));
             p.sheen_model = self.sheen_model;
@@ -196,7 +196,7 @@ impl Material {
     /// applies at each point.
     pub fn tint_emission(&mut self) {
         if !self.has_textured_tint() {
-            self.emission *= Material::coat_tint(self.clearcoat, self.clearcoat_ior, self.clearcoat_color);
+            self.emission *= Material::coat_tint(self.clearcoat.factor, self.clearcoat_ior.factor, self.clearcoat_color.factor);
         }
     }
 

@@ -97,8 +97,8 @@ impl Material {
     /// Whether the base or the clear coat may have a delta lobe, and whether one of them may have a narrow lobe that is
     /// not a delta lobe.
     pub fn perfect_and_sharp(&self) -> (bool, bool) {
-        let base = (self.roughness, self.roughness.texture.is_some());
-        let coat = (self.clearcoat_roughness, self.clearcoat_roughness.texture.is_some());
+        let base = (self.roughness.factor, self.roughness.texture.is_some());
+        let coat = (self.clearcoat_roughness.factor, self.clearcoat_roughness.texture.is_some());
         let lobes = [Some(base), (self.clearcoat.factor > 0.0).then_some(coat)];
         let any =
             |of: &dyn Fn(f32) -> bool| lobes.iter().flatten().any(|&(roughness, textured)| textured || of(roughness));
@@ -110,9 +110,9 @@ impl Material {
     /// on itself.
     pub fn is_clear(&self) -> bool {
         let perfect = is_perfect(self.roughness.factor) && self.roughness.texture.is_none();
-        let glass = self.transmission.factor == 1.0.into() && self.transmission.texture.is_none() && self.metallic.factor == 0.0.into();
-        let covered = self.clearcoat.factor > 0.0 || self.sheen_color.factor != Rgb::ZERO.into();
-        perfect && (glass || self.metallic.factor == 1.0.into()) && !covered
+        let glass = self.transmission.factor == 1.0 && self.transmission.texture.is_none() && self.metallic.factor == 0.0;
+        let covered = self.clearcoat.factor > 0.0 || self.sheen_color.factor != Rgb::ZERO;
+        perfect && (glass || self.metallic.factor == 1.0) && !covered
     }
 
     /// Whether the material makes visible caustics: a mirror or glass with a narrow lobe.

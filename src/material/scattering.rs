@@ -84,7 +84,7 @@ fn coat_indices(material: &Material) -> impl Iterator<Item = f32> {
     const STEP: f32 = 0.02;
     const MAX_STEPS: f32 = 200.0;
     let above = material.clearcoat_ior.factor - 1.0;
-    let steps = match material.clearcoat_ior_texture {
+    let steps = match material.clearcoat_ior.texture {
         Some(_) => (above / STEP).ceil().clamp(1.0, MAX_STEPS),
         None => 1.0,
     };

@@ -59,7 +59,7 @@ impl TriangleLight {
         if material.unlit {
             coat = 0.0;
         }
-        if material.clearcoat_ior_texture.is_none() {
+        if material.clearcoat_ior.texture.is_none() {
             coat_ior = material.clearcoat_ior.factor;
         }
         let textured = material.has_textured_emission();
