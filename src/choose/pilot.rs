@@ -254,7 +254,17 @@ impl<'a> Pilot<'a> {
         if settings.stop.requested() {
             return Vec::new();
         }
-        let variances = moments.relative();
+        let kept = std::env::var("CQ_LEFT").ok().and_then(|v| v.parse::<f64>().ok()).unwrap_or(1.0);
+        let variances = moments.relative(kept);
+        if let Ok(path) = std::env::var("CQ_DUMP") {
+            let (one, cov) = (moments.relative(1.0), moments.relative(0.0));
+            let lines: String = counts.iter().zip(one.iter().zip(&cov)).map(|(c, (v, s))| {
+                let candidate = Candidate::with_counts(*c, guided && c.light_paths > 0);
+                let t = settings_of(candidate).map_or(0.0, |s| guided_cost.as_ref().filter(|_| candidate.guided).unwrap_or(&self.cost).film_seconds(candidate, &s, camera));
+                format!("{} {} {} V {v:.5} cov {s:.5} seconds {t:.4} vt {:.5} ct {:.5}\n", c.light_paths, c.connections, c.merging, v * t, s * t)
+            }).collect();
+            let _ = std::fs::write(path, lines);
+        }
         let presence = Presence::of(scene, camera);
         let result = |(counts, variance): (Counts, f64)| {
             let candidate = Candidate::with_counts(counts, guided && counts.light_paths > 0);

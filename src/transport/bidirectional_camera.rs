@@ -34,6 +34,7 @@ pub struct CameraWalkContext<'a> {
     /// Photons of the previous iteration; `None` if this camera path merges none. If no camera path of the pixel merges
     /// any, all etas, the factors of merging in MIS weights, must be [`mis::Eta::NONE`].
     pub photons: Option<&'a PhotonMap<MergePhoton>>,
+    pub subset: u8,
     /// Merging radii of the pixel of the camera path, by bandwidth level.
     pub levels: &'a MergeLevels,
 }
@@ -380,6 +381,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
                 };
                 let merge = Merge {
                     photons,
+                    subset: self.context.subset,
                     levels: self.context.levels,
                     mis: &self.mis,
                     joins,

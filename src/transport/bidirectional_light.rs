@@ -105,6 +105,7 @@ struct LightWalk<'a, 's, R> {
     /// Probability of the decisions of alpha about the solids around the start of the segment, at the last vertex.
     chance: f32,
     photons_only: bool,
+    subset: u8,
     vertices: &'a mut LightVertices<'s>,
     left: &'a mut Deposits,
     record: &'a mut R,
@@ -213,7 +214,9 @@ impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
         {
             let flux = vertex.throughput / *merged_paths;
             let (joins, presence) = (self.joins(vertex.depth), vertex.presence(camera_paths.scene));
-            self.left.photons.push(MergePhoton::new(vertex, flux, self.prefix, self.group, &self.mis, joins, presence));
+            let mut photon = MergePhoton::new(vertex, flux, self.prefix, self.group, &self.mis, joins, presence);
+            photon.subset = self.subset;
+            self.left.photons.push(photon);
         }
         let connected = self.shared.connects_light_vertex(vertex.depth);
         if connected && lobes.intersects(LobeSet::SMOOTH) && !self.photons_only && vertex.depth < camera_paths.max_depth
@@ -344,6 +347,7 @@ impl<'s> Bidirectional<'s> {
             lobes: None,
             chance: 1.0,
             photons_only,
+            subset: (emitted.stream.vertex(0).bits(Purpose::Merging) % u64::from(super::proto().0)) as u8,
             vertices,
             left,
             record,

@@ -52,7 +52,7 @@ pub use lobe_layers::{FirstScatter, LobeLayer, LobeLight, LobeRecord};
 pub use pass_through::{BulbHit, PassThroughHit};
 pub use path::{path_radiance, path_sample};
 pub use photon_batch::Scratch;
-pub use photon_merge::MergePhoton;
+pub use photon_merge::{MergePhoton, proto};
 pub use pixel_sample::{Features, PixelSample};
 pub use probe::{GatherPoint, Probe};
 pub use roulette::{MAX_SPLITS, SPARED_BY_ROULETTE};

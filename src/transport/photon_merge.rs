@@ -15,6 +15,15 @@ use crate::plan::{CameraSuffix, ClassSet, LightPrefix, PathClass};
 use crate::spectrum::Band;
 use std::f32::consts::FRAC_1_PI;
 
+/// Proto: number of subsets, and factor of the bandwidth.
+pub fn proto() -> (u32, f32) {
+    static P: std::sync::OnceLock<(u32, f32)> = std::sync::OnceLock::new();
+    *P.get_or_init(|| {
+        let get = |name: &str| std::env::var(name).ok().and_then(|v| v.parse::<f32>().ok()).unwrap_or(1.0);
+        (get("CQ_SUBSETS") as u32, get("CQ_RADIUS"))
+    })
+}
+
 /// A photon for merging in the next iteration: a light vertex, reduced to the data that this needs.
 #[derive(Clone, Copy, Debug)]
 pub struct MergePhoton {
@@ -41,6 +50,8 @@ pub struct MergePhoton {
     group: Group,
     /// Code of the solids around that alpha lets not exist for the light path ([`Presence::absent`]).
     absent: u8,
+    /// Proto: subset of the light path.
+    pub subset: u8,
 }
 
 impl Located for MergePhoton {
@@ -93,6 +104,7 @@ impl MergePhoton {
             band: Band::of_wavelength(vertex.wavelength.as_ref()),
             group,
             absent: presence.absent,
+            subset: 0,
         }
     }
 
@@ -107,6 +119,7 @@ impl MergePhoton {
 /// Data for merging photons at one vertex of a camera path.
 pub(super) struct Merge<'a> {
     pub photons: &'a PhotonMap<MergePhoton>,
+    pub subset: u8,
     pub levels: &'a MergeLevels,
     /// Partial sums of MIS weights of the camera path at the vertex.
     pub mis: &'a MisState,
@@ -142,7 +155,7 @@ impl Merge<'_> {
         let (ng, shading) = (vertex.surface.ng, vertex.shading);
         let mut photon_shares = PhotonShares::new(vertex, self.suffix, self.classes);
         self.photons.within(vertex.surface.p, largest, |photon, distance2| {
-            if !same_surface(photon, ng) || u32::from(photon.depth) > self.longest || photon.absent != self.absent {
+            if photon.subset != self.subset || !same_surface(photon, ng) || u32::from(photon.depth) > self.longest || photon.absent != self.absent {
                 return;
             }
             let wavelength = vertex.wavelength.as_ref();

@@ -207,6 +207,7 @@ impl Passes {
             schedule: settings.schedule(i),
             expected: self.covered * (self.pairs.len() as f64 * settings.counts.light_paths_per_pixel()) as f32,
             initial: &self.initial,
+            turn: ((i * 7 % 5) as u32, (i * 3 % 7) as u32),
         };
         for ((pair, light_paths), samples) in self.pairs.iter().zip(&light).zip(&mut self.samples) {
             let own = pair.own(settings.levels.picture_level());
@@ -250,6 +251,7 @@ struct Iteration<'i, 'a> {
     shared: Bidirectional<'a>,
     tiles: Tiles,
     cells: LightCells,
+    turn: (u32, u32),
     /// Map of the photons of the previous iteration; `None` without merging.
     map: Option<&'i PhotonMap<MergePhoton>>,
     /// Probability that a camera path merges with photons.
@@ -323,14 +325,15 @@ impl Iteration<'_, '_> {
             let eta = match (self.map.is_some(), shared.techniques.connect) {
                 (false, _) => Eta::NONE,
                 (true, true) => {
-                    let merges = shared.merged_paths * self.merging;
-                    Eta::new(radius2, merges).sharing_camera_path(self.expected * shrunk)
+                    let k = crate::transport::proto().0 as f32;
+                    let merges = shared.merged_paths * self.merging / k;
+                    Eta::new(radius2, merges).sharing_camera_path(self.expected * shrunk / k)
                 }
                 (true, false) => Eta::MERGE_ONLY,
             };
             (radius2, eta)
         }))
-        .with_probability(self.merging)
+        .with_probability(self.merging / crate::transport::proto().0 as f32)
     }
 
     /// The photons that a camera path merges with: all, or none if the random number `u` is above the probability.
@@ -403,7 +406,11 @@ impl Iteration<'_, '_> {
     ) {
         let levels = self.levels(place.index as u32, walks.pair);
         let photons = self.photons_of_path(|| start.1.vertex(0).one(Purpose::Merging));
-        let context = CameraWalkContext { vertices, photons, levels: &levels };
+        let k = crate::transport::proto().0;
+        let side = k.isqrt().max(1);
+        let (x, y) = (place.pixel.0 + self.turn.0, place.pixel.1 + self.turn.1);
+        let subset = (y % side * side + x % side) as u8;
+        let context = CameraWalkContext { vertices, photons, levels: &levels, subset };
         recorder.select_pixel(place.at, walks.own);
         let mut sample = PixelSample::default();
         self.shared.camera_path(arena, start, &context, recorder, &mut sample);
@@ -506,9 +513,10 @@ impl Integrator for Passes {
             }
             _ => FOOTPRINT_PIXELS.min(widest * camera.whole_width()),
         };
-        self.covered = std::f32::consts::PI * covered * covered;
+        let factor = crate::transport::proto().1;
+        self.covered = std::f32::consts::PI * covered * covered * factor * factor;
         let pixels = settings.pixels(scene, &all);
-        self.initial = pixels.iter().map(|pixel| pixel.bandwidths[0]).collect();
+        self.initial = pixels.iter().map(|pixel| pixel.bandwidths[0] * factor).collect();
         pixels
     }
 

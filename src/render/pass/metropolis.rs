@@ -205,7 +205,7 @@ impl Walks<'_, '_> {
         if shared.only.is_none_or(|only| only.camera > 0) {
             let mut start = shared.camera_paths.start_at((pixel.x, pixel.y), within, camera);
             start.wavelength_sample = self.light_paths.wavelength_sample_of(light);
-            let context = CameraWalkContext { vertices: &vertices, photons: None, levels: self.levels };
+            let context = CameraWalkContext { vertices: &vertices, photons: None, subset: 0, levels: self.levels };
             shared.camera_path(arena, &(start, camera), &context, found, sample);
         }
     }

@@ -191,6 +191,15 @@ struct Sums {
     moment: f64,
     /// Values of the samples of camera, connections and merges.
     values: [Rgb; 3],
+    /// Products of the values of photons that a pixel and its left neighbour merge.
+    shared: f64,
+}
+
+/// A merged photon, as a pixel and its neighbour compare them.
+struct Merged {
+    /// Position of the photon, by which it is recognised.
+    from: [u32; 3],
+    sample: Sample,
 }
 
 impl Sums {
@@ -223,6 +232,23 @@ impl Sums {
             self.moment += 2.0 * f64::from((value * paired).element_sum()) / 3.0;
             before[group] += if factors.spares { value } else { value * sample.unspared as f32 };
             self.values[group] += value;
+        }
+    }
+
+    /// Adds the products of the values of photons that two neighbouring pixels merge.
+    fn add_shared(&mut self, left: &[Merged], here: &[Merged], factors: &Factors) {
+        let value = |Merged { sample, .. }: &Merged| {
+            sample.value * (sample.proxy / factors.sum(&sample.densities, sample.eta)) as f32
+        };
+        if factors.merges.x == 0.0 {
+            return;
+        }
+        let mut left = left.iter().peekable();
+        for one in here {
+            while left.next_if(|other| other.from < one.from).is_some() {}
+            if let Some(other) = left.peek().filter(|other| other.from == one.from) {
+                self.shared += f64::from((value(one) * value(other)).element_sum()) / 3.0;
+            }
         }
     }
 
@@ -301,6 +327,8 @@ struct RowOutput {
     direct: Vec<(usize, Rgb)>,
     photons: [Vec<MergePhoton>; 3],
     survival: PhotonSurvival,
+    /// The pixel before and the photons that it has merged.
+    before: (usize, Vec<Merged>),
 }
 
 /// Photons of the previous iteration: the maps of the three sets of weights, and the survival of their light paths.
@@ -421,6 +449,7 @@ impl Walks<'_, '_> {
         for (block, sums) in blocks.iter_mut().zip(rows.iter().flat_map(|row| &row.blocks)) {
             for (total, sums) in block.sums.iter_mut().zip(sums) {
                 total.moment += sums.moment;
+                total.shared += sums.shared;
                 total.values.iter_mut().zip(sums.values).for_each(|(total, value)| *total += value);
             }
         }
@@ -499,7 +528,7 @@ impl Walks<'_, '_> {
             if let Some(emitted) = &emitted {
                 shared.light_path(light_paths, emitted, false, &mut vertices, &mut left[k], &mut survival);
             }
-            let context = CameraWalkContext { vertices: &vertices, photons: Some(&photons.maps[k]), levels: &levels };
+            let context = CameraWalkContext { vertices: &vertices, photons: Some(&photons.maps[k]), subset: 0, levels: &levels };
             shared.camera_path(arena, &start, &context, &mut found[k], &mut sample);
             if k == 0 {
                 let of_photons = left[0].photons.iter().map(|photon| (photon.p, survival.at(photon.depth.into())));
@@ -515,18 +544,31 @@ impl Walks<'_, '_> {
             })
         };
         output.direct.push((pixel, sample.direct));
-        let mut samples = Vec::new();
+        let (mut samples, mut merged) = (Vec::new(), Vec::new());
         for ((one, connected), lit) in found[0].list.iter().zip(&found[1].list).zip(&found[2].list) {
             let ratios = [one.ratios, connected.ratios, lit.ratios];
             output.light.extend(lit_pixel(pixel, one.value));
-            let sample = self.sample(pixel, one.technique, ratios, one.value).filter(|_| !one.is_direct);
+            let sample = || self.sample(pixel, one.technique, ratios, one.value).filter(|_| !one.is_direct);
+            if let (Technique::Merge { .. }, Some(sample)) = (one.technique, sample()) {
+                merged.push(Merged { from: one.from.to_array().map(f32::to_bits), sample });
+            }
+            let sample = sample();
             samples.extend(sample.map(|sample| {
                 let by_camera = one.survival.without_light_path(light_survival(one.technique, one.from));
                 Sample { unspared: one.survival.ratio(), by_camera, ..sample }
             }));
         }
         let block = &mut output.blocks[self.block_of(pixel) % self.blocks.width];
-        block.iter_mut().zip(&self.candidates).for_each(|(sums, factors)| sums.add(&samples, factors));
+        merged.sort_by_key(|one| one.from);
+        let (before, of_left) = std::mem::replace(&mut output.before, (pixel, merged));
+        let is_left = before + 1 == pixel && !pixel.is_multiple_of(self.proxy.camera.size().0 as usize);
+        let here = &output.before.1;
+        block.iter_mut().zip(&self.candidates).for_each(|(sums, factors)| {
+            sums.add(&samples, factors);
+            if is_left {
+                sums.add_shared(&of_left, here, factors);
+            }
+        });
         for ((one, connected), lit) in left[0].splats.iter().zip(&left[1].splats).zip(&left[2].splats) {
             let (pixel, technique) = (one.pixel as usize, Technique::Camera { light: one.light });
             let value = one.value * one.ratios.weight(self.levels(pixel).eta()[0]);
@@ -570,6 +612,11 @@ impl Moments {
         block.pixels * block.sums[candidate].variance(block.pixels * self.iterations, &self.candidates[candidate])
     }
 
+    /// The covariance of neighbouring pixels that merge the same photons, summed over the pixels of a block.
+    fn covariance(&self, block: &Block, candidate: usize) -> f64 {
+        block.sums[candidate].shared * self.candidates[candidate].merges.x / self.iterations
+    }
+
     /// Mean over pixels of the variance of an iteration's indirect light, by candidate.
     pub fn indirect_variances(&self) -> Vec<f64> {
         let pixels: f64 = self.blocks.iter().map(|block| block.pixels).sum();
@@ -578,7 +625,7 @@ impl Moments {
     }
 
     /// Mean relative variance of an iteration of each candidate over the picture, without the worst blocks.
-    pub fn relative(&self) -> Vec<f64> {
+    pub fn relative(&self, kept: f64) -> Vec<f64> {
         let means: Vec<f64> =
             self.blocks.iter().map(|block| block.light / (block.pixels * self.iterations).max(1.0)).collect();
         let floor = floor::relative_to_mean(means.iter().copied());
@@ -591,6 +638,7 @@ impl Moments {
         let relative = |candidate: usize| {
             let of_block = |(block, weight): (&Block, &f64)| {
                 let variance = self.indirect_variance(block, candidate).max(0.0) + block.direct_variance;
+                let variance = kept * variance + (1.0 - kept) * self.covariance(block, candidate);
                 weight * variance / block.pixels.max(1.0)
             };
             let mut all: Vec<f64> = self.blocks.iter().zip(&weights).map(of_block).collect();
