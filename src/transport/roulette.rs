@@ -18,17 +18,17 @@ const MIN_SURVIVAL: f32 = 0.02;
 
 /// Largest number of smooth interfaces at which a camera path splits into reflection and transmission.
 pub const MAX_SPLITS: u32 = 4;
-/// Share of the weight of a camera path above which the weaker branch behind a smooth interface is always followed. A
-/// weaker one is followed with a probability in proportion to its share. So a path has at most about the reciprocal of
-/// this number of branches.
+/// Smallest share of the weight of a camera path that a branch behind a smooth interface has when both are followed. So a
+/// path has at most about the reciprocal of this number of branches.
 const MIN_BRANCH_SHARE: f32 = 0.25;
 /// Smallest share of the weight of a camera path that is split into several wavelengths.
 pub(super) const MIN_DISPERSED_SHARE: f32 = 0.5;
 
-/// Probability of following the weaker branch behind a smooth interface, which has this share of the path's weight.
+/// Share that the weaker branch behind a smooth interface has where it is followed, of a path that has the share `path`
+/// itself. `weak` is the branch's probability if one of the two is chosen. 1: the other branch is not followed then.
 #[inline]
-pub(super) fn branch_chance(share: f32) -> f32 {
-    (share / MIN_BRANCH_SHARE).min(1.0)
+pub(super) fn branch_share(path: f32, weak: f32) -> f32 {
+    (MIN_BRANCH_SHARE / path).clamp(weak, 1.0)
 }
 
 /// Probability that a path of `depth` bounces continues, if it is expected to keep the fraction `expected` of its

@@ -5,7 +5,7 @@ use super::fire::MediumEmission;
 use super::flight::{Fly, Split};
 use super::interior::Interior;
 use super::pass_through::{BulbHit, PassThroughHit, for_each_bulb, for_each_pass_through_light};
-use super::roulette::{MIN_DISPERSED_SHARE, branch_chance, late_survival};
+use super::roulette::{MIN_DISPERSED_SHARE, branch_share, late_survival};
 use super::scattering_vertex::ScatterPoint;
 use super::segment::{
     Arrival, Attenuate, Clear, End, MediumArrival, PrecomputedHit, Start, camera_token, next_vertex, token,
@@ -453,8 +453,8 @@ impl<'a> Path<'a> {
         self.interior = if sample.transmitted { vertex.interior_behind } else { vertex.interior };
     }
 
-    /// Splits the path at a smooth interface: follows its weaker branch, if roulette lets it, to the end, and continues the
-    /// path along the stronger one.
+    /// Splits the path at a smooth interface: follows both branches, the weaker one to the end, or one of them.
+    /// Shares sum to one in all cases, so that branches of equal radiance add no noise.
     #[inline(never)]
     fn split_interface<V: Visitor<'a>, const BESIDES: u8>(
         &mut self,
@@ -464,18 +464,22 @@ impl<'a> Path<'a> {
         visitor: &mut V,
     ) {
         self.splits -= 1;
-        let chance = branch_chance(self.share * weak.pdf_w);
-        if vertex.draws.happens(chance, Purpose::Lobe) {
-            let mut branch = *self;
-            branch.stream = self.stream.branch(self.depth, 0);
-            branch.take_share(weak.pdf_w / chance);
-            visitor.branch(|visitor| {
-                branch.leave(vertex, &weak, (going, scale), visitor);
-                branch.depth += 1;
-                branch.follow_branch::<V, BESIDES>(&PrecomputedHit::Unknown, visitor);
-            });
+        let share = branch_share(self.share, weak.pdf_w);
+        if !vertex.draws.happens(weak.pdf_w / share, Purpose::Lobe) {
+            return self.leave(vertex, &strong, (going, scale), visitor);
         }
-        self.take_share(strong.pdf_w);
+        if share == 1.0 {
+            return self.leave(vertex, &weak, (going, scale), visitor);
+        }
+        let mut branch = *self;
+        branch.stream = self.stream.branch(self.depth, 0);
+        branch.take_share(share);
+        visitor.branch(|visitor| {
+            branch.leave(vertex, &weak, (going, scale), visitor);
+            branch.depth += 1;
+            branch.follow_branch::<V, BESIDES>(&PrecomputedHit::Unknown, visitor);
+        });
+        self.take_share(1.0 - share);
         self.leave(vertex, &strong, (going, scale), visitor);
     }
 

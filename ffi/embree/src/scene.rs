@@ -242,7 +242,11 @@ impl SceneBuilder {
         }
         // SAFETY: the scene is alive and all its geometries are committed.
         unsafe { (common.commit_scene)(scene) };
-        device.check("build a scene")?;
+        if let Err(error) = device.check("build a scene") {
+            // Embree may end the process when it destroys a scene whose construction has failed.
+            std::mem::forget(self.owned);
+            return Err(error);
+        }
         let shared = Shared { owned: self.owned, has_instances: self.has_instances };
         let trace = device.library().trace();
         // SAFETY: the device is alive.
