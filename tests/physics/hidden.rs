@@ -171,11 +171,8 @@ fn check(cases: Vec<Case>, methods: &[Method], photons: u32) {
             let settings = Settings {
                 method,
                 photons,
-                iterations: Some(match method {
-                    Method::Light => 2000, // with as many light paths as pixels
-                    Method::Bpm => 400,    // every light path counts for a narrow bundle of camera paths
-                    _ => 4,
-                }),
+                // These two have as many light paths as pixels.
+                iterations: Some(if matches!(method, Method::Light | Method::Bpm) { 1000 } else { 4 }),
                 levels: Levels::new(1),
                 initial_bandwidth: InitialBandwidth::Fixed(0.1),
                 alpha: method.default_alpha(),
