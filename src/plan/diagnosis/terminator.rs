@@ -17,9 +17,7 @@ const MAX_ANGLE: f32 = 10.0;
 /// A warning that names the matte objects whose faces are turned away from their shading normals, if a light without size,
 /// whose shadows have sharp edges, shines on the scene.
 pub(in super::super) fn stepped_shadows(scene: &Scene) -> Option<String> {
-    if scene.lights.others().next().is_none() {
-        return None;
-    }
+    scene.lights.others().next()?;
     let mut objects = BTreeSet::new();
     for (index, instance) in scene.shapes.instances.iter().enumerate() {
         let material = &scene.materials.list[instance.material as usize];
