@@ -61,16 +61,14 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     outputs.check(
         [args.image.as_path(), &args.reference].into_iter().chain(args.mask.as_deref().map(|mask| mask_parts(mask).0)),
     )?;
-    let (image, of_image) = read(&args.image, args.layer.as_deref())?;
-    let (reference, of_reference) = read(&args.reference, args.layer.as_deref())?;
+    let image = read(&args.image, args.layer.as_deref())?;
+    let reference = read(&args.reference, args.layer.as_deref())?;
     let floor = if args.relative { Floor::Relative } else { Floor::Papers };
-    let compared = Form::for_output(args.json).during("comparing", || compare_windows(&image, &reference, floor));
+    let compared = Form::for_output(args.json).during("comparing", || compare_windows(&image.0, &reference.0, floor));
     let (mut comparison, common) = compared.map_err(|e| e.within(args.image.display()))?;
-    let mask = args.mask.as_deref().map(|mask| read_mask(mask, image.whole)).transpose()?;
-    let of_mask = mask.as_ref().map(|(picture, inside)| (picture, inside));
-    let of_image = of_image.as_ref().map(|inside| (&image, inside));
-    let of_reference = of_reference.as_ref().map(|inside| (&reference, inside));
-    if let Some((picture, inside)) = of_mask.or(of_image).or(of_reference) {
+    let mask = args.mask.as_deref().map(|mask| read_mask(mask, image.0.whole)).transpose()?;
+    let mut readings = mask.iter().chain([&image, &reference]);
+    if let Some((picture, inside)) = readings.find_map(|(picture, inside)| Some((picture, inside.as_ref()?))) {
         comparison.measure_inside(&picture.values_in(&common[0], inside)?);
     }
     let [image, reference] = common;
@@ -88,9 +86,12 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     if args.json { print_json(&json!(comparison)) } else { print(&text(&comparison)) }
 }
 
+/// The layers of an EXR, and which of its pixels show smooth glass or a mirror, if it says so.
+type Reading = (Windowed, Option<Vec<bool>>);
+
 /// Reads the layers of an EXR, and which of its pixels show smooth glass or a mirror, if it says so. If a layer is named, it
 /// becomes the picture, without the other layers.
-fn read(path: &Path, layer: Option<&str>) -> Result<(Windowed, Option<Vec<bool>>)> {
+fn read(path: &Path, layer: Option<&str>) -> Result<Reading> {
     let (mut windowed, attributes) = exr::read_window(path)?;
     let inside = smooth_pixels(&windowed.set, &attributes);
     if let Some(name) = layer {
@@ -118,7 +119,7 @@ fn mask_parts(argument: &Path) -> (&Path, Option<&str>) {
 }
 
 /// Reads the argument of --mask, for a picture of this size.
-fn read_mask(argument: &Path, whole: Size) -> Result<(Windowed, Vec<bool>)> {
+fn read_mask(argument: &Path, whole: Size) -> Result<Reading> {
     let (path, layer) = mask_parts(argument);
     let fault = |cause: &str| Error::new(ErrorKind::Usage, path.display(), cause);
     let (mask, smooth) = read(path, layer)?;
@@ -132,7 +133,7 @@ fn read_mask(argument: &Path, whole: Size) -> Result<(Windowed, Vec<bool>)> {
             error.hint("render it with --layers that include CryptoMaterial, or name a layer: FILE:LAYER")
         })?,
     };
-    Ok((mask, inside))
+    Ok((mask, Some(inside)))
 }
 
 /// The name of a layer for messages, or the channels of the beauty layer, which has no name.

@@ -9,8 +9,8 @@
 //! underestimates its own. `c` is 3 for many samples. The standard error of few samples is itself uncertain, so that `c`
 //! is the quantile of Student's distribution that excludes as much as three standard deviations of a normal one: 3.3
 //! for 32 samples, 9.2 for 4, and no bound for one. As `s` falls with the iterations, so does the displacement: for any
-//! `D` the picture converges to the limit of `M` (`docs/theory.md`). The result is clamped between zero and the brightest estimate around; clamped
-//! pixels are counted.
+//! `D` the picture converges to the limit of `M` (`docs/theory.md`). The result is clamped between zero and the brightest
+//! estimate around; clamped pixels are counted.
 
 use super::Estimate;
 use super::window::window;

@@ -105,19 +105,26 @@ pub struct Errors {
 /// The errors of `a` against the reference `b` over all pixels that are finite in both; `None` if there is no such
 /// pixel.
 pub fn errors(a: &Picture, b: &Picture) -> Option<Errors> {
-    errors_with_floor(a, b, floor::ABSOLUTE, 0)
+    errors_of(a, b, &error_map(a, b, floor::ABSOLUTE), 0)
 }
 
-/// `outside`: number of pixels around both pictures that are black in both.
-fn errors_with_floor(a: &Picture, b: &Picture, floor: f64, outside: usize) -> Option<Errors> {
-    let finite = |&i: &usize| a[i].iter().chain(&b[i]).all(|v| v.is_finite());
-    let pixels: Vec<usize> = (0..a.len().min(b.len())).filter(finite).collect();
+/// The relative squared error of each pixel that both pictures have; NaN where a pixel is not finite in both.
+fn error_map(a: &Picture, b: &Picture, floor: f64) -> Vec<f64> {
+    let finite = |i: usize| a[i].iter().chain(&b[i]).all(|v| v.is_finite());
+    let error = |i: usize| if finite(i) { squared_error(a[i], b[i]) / weight(b[i], floor) } else { f64::NAN };
+    (0..a.len().min(b.len())).map(error).collect()
+}
+
+/// The errors of pictures from their [`error_map`]. `outside`: number of pixels around both pictures that are black in
+/// both.
+fn errors_of(a: &Picture, b: &Picture, map: &[f64], outside: usize) -> Option<Errors> {
+    let pixels: Vec<usize> = (0..map.len()).filter(|&i| !map[i].is_nan()).collect();
     let count = pixels.len() + outside;
     if count == 0 {
         return None;
     }
     let n = count as f64;
-    let mut relative: Vec<f64> = pixels.iter().map(|&i| squared_error(a[i], b[i]) / weight(b[i], floor)).collect();
+    let mut relative: Vec<f64> = pixels.iter().map(|&i| map[i]).collect();
     let relmse = relative.iter().sum::<f64>() / n;
     relative.sort_unstable_by(f64::total_cmp);
     let kept = count - (n * TRIMMED_SHARE) as usize;
@@ -249,9 +256,9 @@ pub fn compare_pictures(a: &Picture, b: &Picture, floor: Floor, outside: usize) 
     let finite = |i: usize| a[i].iter().chain(&b[i]).all(|v| v.is_finite());
     let pixels: Vec<usize> = (0..a.len()).filter(|&i| finite(i)).collect();
     let floor = floor.of(b, outside);
-    let grains = grain_map(a, b, floor);
+    let (errors, grains) = (error_map(a, b, floor), grain_map(a, b, floor));
     let (Some(Errors { relmse, relmse_trimmed, mse, mean_ratio }), Some(grain)) =
-        (errors_with_floor(a, b, floor, outside), mean_of_known(&grains, outside))
+        (errors_of(a, b, &errors, outside), mean_of_known(&grains, outside))
     else {
         return Err(Error::new(ErrorKind::Image, "", "the pictures have no pixel with finite values in common"));
     };
@@ -272,6 +279,6 @@ pub fn compare_pictures(a: &Picture, b: &Picture, floor: Floor, outside: usize) 
         pixels_not_finite: (a.len() - pixels.len()) as u64,
         inside: None,
         flip_map,
-        error_maps: [(0..a.len()).map(|i| squared_error(a[i], b[i]) / weight(b[i], floor)).collect(), grains],
+        error_maps: [errors, grains],
     })
 }
