@@ -1,5 +1,8 @@
 //! Ends an iteration early, by a stop request or a deadline. Its units of work poll [`Stop::should_abort`]. Once a poll
 //! returns true, the whole iteration is aborted and its results are discarded.
+//!
+//! The first iteration is the exception, because a picture needs one: its deadline cuts long paths instead. Walks poll
+//! [`Stop::should_end_path`] every few vertices.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -20,7 +23,10 @@ struct State {
     created: Instant,
     /// Nanoseconds after `created`, or [`NO_DEADLINE`].
     deadline: AtomicU64,
+    /// Whether the deadline cuts long paths, and does not abort the iteration.
+    deadline_cuts: AtomicBool,
     aborted: AtomicBool,
+    has_cut: AtomicBool,
 }
 
 impl Default for Stop {
@@ -34,15 +40,31 @@ impl Stop {
     /// A stop that is requested by setting `requested` to true, also from another thread.
     #[allow(clippy::disallowed_methods, reason = "a deadline decides when a render stops, and nothing else")]
     pub fn from_flag(requested: Arc<AtomicBool>) -> Stop {
-        let (deadline, aborted) = (AtomicU64::new(NO_DEADLINE), AtomicBool::new(false));
-        Stop { requested, state: Arc::new(State { created: Instant::now(), deadline, aborted }) }
+        let (created, deadline) = (Instant::now(), AtomicU64::new(NO_DEADLINE));
+        let [deadline_cuts, aborted, has_cut] = [const { AtomicBool::new(false) }; 3];
+        Stop { requested, state: Arc::new(State { created, deadline, deadline_cuts, aborted, has_cut }) }
     }
 
     /// Starts an iteration that is not aborted, with a deadline `seconds` from now; without a deadline if `None`.
     pub fn start_iteration(&self, seconds: Option<f64>) {
+        self.start(seconds, false);
+    }
+
+    /// Starts an iteration whose long paths are cut after `seconds`; never if `None`.
+    pub fn start_first_iteration(&self, seconds: Option<f64>) {
+        self.start(seconds, true);
+    }
+
+    fn start(&self, seconds: Option<f64>, cuts: bool) {
         let end = |seconds: f64| (self.nanoseconds() as f64 + 1e9 * seconds.max(0.0)) as u64;
         self.state.deadline.store(seconds.map_or(NO_DEADLINE, end), Ordering::Relaxed);
+        self.state.deadline_cuts.store(cuts, Ordering::Relaxed);
         self.state.aborted.store(false, Ordering::Relaxed);
+    }
+
+    /// Forgets that paths have been cut, before the pilot of a render.
+    pub fn forget_cuts(&self) {
+        self.state.has_cut.store(false, Ordering::Relaxed);
     }
 
     fn nanoseconds(&self) -> u64 {
@@ -57,15 +79,34 @@ impl Stop {
     /// Whether a unit of work must end, because of a request, the deadline or an earlier abort. If so, the iteration
     /// becomes aborted.
     pub fn should_abort(&self) -> bool {
-        let late = || {
-            let deadline = self.state.deadline.load(Ordering::Relaxed);
-            deadline != NO_DEADLINE && self.nanoseconds() >= deadline
-        };
+        let late = || !self.state.deadline_cuts.load(Ordering::Relaxed) && self.is_late();
         let ends = self.aborted() || self.requested() || late();
         if ends {
             self.state.aborted.store(true, Ordering::Relaxed);
         }
         ends
+    }
+
+    /// Whether a path must end where it is, because of an abort or a deadline that cuts paths.
+    pub fn should_end_path(&self) -> bool {
+        if self.has_cut_paths() || self.should_abort() {
+            return true;
+        }
+        let cuts = self.state.deadline_cuts.load(Ordering::Relaxed) && self.is_late();
+        if cuts {
+            self.state.has_cut.store(true, Ordering::Relaxed);
+        }
+        cuts
+    }
+
+    /// Whether a deadline has cut paths of the render.
+    pub fn has_cut_paths(&self) -> bool {
+        self.state.has_cut.load(Ordering::Relaxed)
+    }
+
+    fn is_late(&self) -> bool {
+        let deadline = self.state.deadline.load(Ordering::Relaxed);
+        deadline != NO_DEADLINE && self.nanoseconds() >= deadline
     }
 
     /// Whether the iteration that was started last is aborted: a unit of its work had to end early.
@@ -94,5 +135,23 @@ mod tests {
         assert!(!stop.should_abort());
         stop.start_iteration(Some(-1.0));
         assert!(stop.should_abort() && !stop.requested());
+    }
+
+    /// The deadline of a first iteration ends its paths, and a request still aborts it.
+    #[test]
+    fn the_deadline_of_the_first_iteration_cuts_paths() {
+        let requested = Arc::new(AtomicBool::new(false));
+        let stop = Stop::from_flag(Arc::clone(&requested));
+        stop.start_first_iteration(Some(3600.0));
+        assert!(!stop.should_end_path() && !stop.has_cut_paths());
+        stop.start_first_iteration(Some(-1.0));
+        assert!(!stop.should_abort() && !stop.has_cut_paths(), "no path was long");
+        assert!(stop.should_end_path() && stop.has_cut_paths() && !stop.aborted());
+        stop.start_iteration(None);
+        assert!(stop.has_cut_paths(), "the picture still lacks the ends of its paths");
+        requested.store(true, Ordering::Relaxed);
+        assert!(stop.should_abort() && stop.aborted());
+        stop.forget_cuts();
+        assert!(!stop.has_cut_paths());
     }
 }

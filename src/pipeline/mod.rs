@@ -107,10 +107,12 @@ pub fn render_loaded(request: Request<'_>, loaded: &Loaded, observer: &mut dyn O
     let Rendered { settings, stats, .. } = &iterated.rendered;
     // Before the render, the plan warns of a small number of iterations that was asked for.
     let planned = |iterations| few_moments(view.scene, iterations).is_some();
-    if !settings.is_shard() && !settings.iterations.is_some_and(planned) {
-        let few = few_moments(view.scene, stats.iterations);
-        few.iter().for_each(|warning| observer.event(Event::FewMoments(warning)));
-        facts.warnings.extend(few);
+    let tells_moments = !settings.is_shard() && !settings.iterations.is_some_and(planned);
+    let few = tells_moments.then(|| few_moments(view.scene, stats.iterations)).flatten();
+    let cut = slow_iteration::warning_of_cut(settings, request.saving.as_ref());
+    for warning in few.into_iter().chain(cut) {
+        observer.event(Event::Warning(&warning));
+        facts.warnings.push(warning);
     }
     during(Phase::Finishing, observer, |observer| deliver::deliver_render(&request, iterated, facts, observer))
 }

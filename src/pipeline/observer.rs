@@ -53,8 +53,8 @@ pub enum Event<'a> {
     },
     /// A checkpoint could not be saved; the render continues.
     SaveFailed(&'a Error),
-    /// A warning that motion blur shows too few moments, because the render has ended after few iterations.
-    FewMoments(&'a str),
+    /// A warning about the iterations, which have ended: motion blur shows few moments, or the time limit has cut paths.
+    Warning(&'a str),
     /// The scene could not be built at another moment of the shutter interval, which ends the render; the iterations so
     /// far make the picture.
     MomentFailed(&'a Error),

@@ -76,7 +76,7 @@ impl<'a> Running<'a> {
     /// Iterates until the settings, the error of the finished picture or the user end the render.
     ///
     /// # Errors
-    /// The user has stopped the render before its first iteration.
+    /// The user has stopped the render before its first iteration; a shard whose paths the time limit has cut.
     pub fn iterate(self, observer: &mut dyn Observer) -> Result<Iterated> {
         let Running { mut session, mut between, head } = self;
         let stop = run_session(&mut session, |progress, session| between.after_iteration(progress, session, observer));
@@ -89,10 +89,12 @@ impl<'a> Running<'a> {
         if session.iterations() == 0 && stop == StopReason::Interrupted {
             refuse_stop(observer)?;
         }
-        if session.iterations() == 0 && stop == StopReason::Time {
+        if session.has_cut_paths() && session.settings().is_shard() {
             return Err(slow_iteration::error(session.settings()));
         }
         let BetweenIterations { finish, saver, .. } = between;
+        // A render that continued from cut paths would lack their light.
+        let saver = saver.filter(|_| !session.has_cut_paths());
         let obsolete_checkpoint = saver.and_then(|saver| saver.save_at_end(&session, stop, observer));
         Ok(Iterated { rendered: session.finish(stop), head, finish, obsolete_checkpoint })
     }
@@ -139,7 +141,7 @@ impl BetweenIterations<'_> {
         let progress = finished_error::add_to_progress(progress, session, accuracy, self.target);
         observer.event(Event::Progress(&progress));
         self.preview(session, observer);
-        if let Some(saver) = &mut self.saver {
+        if let Some(saver) = self.saver.as_mut().filter(|_| !session.has_cut_paths()) {
             saver.save_if_due(session, observer);
         }
         match self.target {

@@ -1,11 +1,12 @@
-//! A warning before a render whose time limit is too short for one iteration, and the error of one whose limit has
-//! passed.
+//! Warnings before and after a render whose time limit is too short for one iteration.
 
+use super::request::Saving;
 use crate::camera::Camera;
 use crate::choose::{pilot_settings, window_cost_ratio};
 use crate::error::Error;
 use crate::render::{RenderInput, Session, Settings};
 use crate::scene::View;
+use crate::transport::CUT_INTERVAL;
 
 /// Largest number of pixels of the picture by which an iteration is timed.
 const MAX_PIXELS: f64 = 64.0 * 64.0;
@@ -37,14 +38,28 @@ fn remedy(settings: &Settings) -> &'static str {
     }
 }
 
-/// The error of a render that has stopped before the end of its first iteration.
+/// Returns a warning if the time limit has cut paths of the first iteration; `None` otherwise. `saving`: the checkpoint
+/// that the user asks for.
+pub(super) fn warning_of_cut(settings: &Settings, saving: Option<&Saving>) -> Option<String> {
+    let checkpoint = if saving.is_some_and(|saving| saving.keep) { "; no checkpoint is saved" } else { "" };
+    settings.stop.has_cut_paths().then(|| {
+        format!(
+            "{}: the picture lacks the light of longer paths and is too dark{checkpoint} (ask for {})",
+            cause_of_cut(settings),
+            remedy(settings)
+        )
+    })
+}
+
+/// The error of a shard whose paths the time limit has cut.
 pub(super) fn error(settings: &Settings) -> Error {
-    let (limit, time) = (settings.first_iteration_limit().unwrap_or(0.0), settings.time.unwrap_or(0.0));
-    let name = settings.method.name();
-    let cause = format!(
-        "--time {time:.0}: the first iteration of --method {name} has not ended after {limit:.0} s, so there is no picture"
-    );
+    let cause = format!("{}, so there is no part of the picture", cause_of_cut(settings));
     Error::usage(cause).hint(format!("use {}", remedy(settings)))
+}
+
+fn cause_of_cut(settings: &Settings) -> String {
+    let name = settings.method.name();
+    format!("--time ended in the first iteration of --method {name}, and paths were cut after {CUT_INTERVAL} segments")
 }
 
 /// Seconds that an iteration takes, estimated by one iteration of a smaller picture with equal work per pixel. The

@@ -38,8 +38,8 @@ pub struct CameraWalkContext<'a> {
     pub levels: &'a MergeLevels,
 }
 
-/// Number of vertices between two checks whether the iteration is aborted before its end.
-const ABORT_CHECK_INTERVAL: u32 = 64;
+/// Number of connections of one vertex between two checks whether paths must end early.
+const CONNECTIONS_PER_CHECK: usize = 256;
 
 struct CameraWalk<'a, R> {
     shared: &'a Bidirectional<'a>,
@@ -297,8 +297,13 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
             self.next_event(vertex);
         }
         let longest = self.shared.camera_paths.max_depth - vertex.depth();
-        for light in self.context.vertices.iter().filter(|light| light.depth < longest) {
-            self.connect(vertex, light);
+        for (index, light) in self.context.vertices.iter().enumerate() {
+            if (index + 1).is_multiple_of(CONNECTIONS_PER_CHECK) && self.stop().is_some_and(Stop::should_end_path) {
+                break;
+            }
+            if light.depth < longest {
+                self.connect(vertex, light);
+            }
         }
     }
 
@@ -308,12 +313,6 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
     fn distance2(&self, distance: f32, scattered: Option<Scattered>) -> f32 {
         if scattered.is_none() && self.shared.camera_paths.camera.is_orthographic() { 1.0 } else { distance * distance }
     }
-
-    /// Whether the iteration is aborted before its end. Checked at every few vertices only.
-    #[inline]
-    fn is_given_up(&self, depth: u32) -> bool {
-        depth.is_multiple_of(ABORT_CHECK_INTERVAL) && self.shared.camera_paths.stop.is_some_and(Stop::should_abort)
-    }
 }
 
 impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
@@ -322,6 +321,11 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
     #[inline]
     fn spared(&self) -> f32 {
         self.shared.spared
+    }
+
+    #[inline]
+    fn stop(&self) -> Option<&Stop> {
+        self.shared.camera_paths.stop
     }
 
     #[inline]
@@ -397,10 +401,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
         }
         self.history.leave(Some(vertex.shading.bsdf.lobes()));
         // A path restricted to hit a light ends there, too.
-        if !self.history.leads(camera_paths.classes)
-            || self.shared.ends_camera_path(vertex.depth)
-            || self.is_given_up(vertex.depth)
-        {
+        if !self.history.leads(camera_paths.classes) || self.shared.ends_camera_path(vertex.depth) {
             return Next::Stop;
         }
         self.last = vertex.receiver();
@@ -482,10 +483,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
             self.connect_all(vertex);
         }
         self.history.leave(None);
-        if !self.history.leads(camera_paths.classes)
-            || self.shared.ends_camera_path(vertex.depth)
-            || self.is_given_up(vertex.depth)
-        {
+        if !self.history.leads(camera_paths.classes) || self.shared.ends_camera_path(vertex.depth) {
             return Next::Stop;
         }
         self.last = vertex.receiver();

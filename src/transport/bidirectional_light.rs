@@ -20,6 +20,7 @@ use crate::math::{Rgb, is_lit};
 use crate::medium::FlightDensity;
 use crate::plan::{CameraSuffix, Event, LightPrefix, Part, PathClass};
 use crate::random::Purpose;
+use crate::stop::Stop;
 
 /// Light that a light path sends to a pixel through a connection to the camera. Its MIS weight depends on the
 /// bandwidths of that pixel.
@@ -193,6 +194,11 @@ impl<R: PathRecorder> LightWalk<'_, '_, R> {
 }
 
 impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
+    #[inline]
+    fn stop(&self) -> Option<&Stop> {
+        self.shared.camera_paths.stop
+    }
+
     #[inline]
     fn surface(&mut self, vertex: &Vertex<'_, 's>, scattered: Option<Scattered>) -> Next {
         let Bidirectional { camera_paths, techniques, merged_paths, .. } = self.shared;

@@ -41,6 +41,7 @@ use crate::photon::{ByKind, Kernel, Near, Photon, PhotonMaps, VolumePhoton};
 use crate::plan::{CameraSuffix, ClassSet, Event, LightPrefix, Part, PathClass};
 use crate::random::Purpose;
 use crate::scene::Scene;
+use crate::stop::Stop;
 
 /// Smallest probability with which a camera path continues by broad lobes, and by the other lobes, at a vertex that has
 /// both.
@@ -78,6 +79,7 @@ pub(super) struct GatheringWalk<'a, B, K, const PATHS: bool> {
     pub lobe_history: LobeHistory,
     /// The last vertex, as a receiver of direct light.
     pub last: Receiver,
+    pub stop: Option<&'a Stop>,
 }
 
 impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, PATHS> {
@@ -254,6 +256,11 @@ impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, 
 impl<'a, B: GatherBandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for GatheringWalk<'_, B, K, PATHS> {
     const BRANCHES: bool = true;
     const SPLITS: bool = true;
+
+    #[inline]
+    fn stop(&self) -> Option<&Stop> {
+        self.stop
+    }
 
     #[inline]
     fn splits(&self) -> u32 {
@@ -516,6 +523,7 @@ impl CameraPaths<'_> {
             record: Some(&mut scratch.lobes).filter(|record| self.lobes && record.level.is_some()),
             lobe_history: LobeHistory::default(),
             last: Receiver::anywhere(Vec3::ZERO),
+            stop: self.stop,
         };
         walk(self.scene, &scratch.arena, start, *stream, Transport::Radiance, self.max_depth, &mut visitor);
         let sample = visitor.sample;

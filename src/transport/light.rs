@@ -121,10 +121,10 @@ impl<'a> LightPaths<'a> {
         LightPaths { wavelengths: Some(wavelengths), ..self }
     }
 
-    /// Stops tracing when `stop` aborts the iteration.
+    /// Stops tracing when `stop` aborts the iteration, and ends paths when it cuts them.
     #[must_use]
-    pub fn stopped_by(self, stop: &'a Stop) -> LightPaths<'a> {
-        LightPaths { stop: Some(stop), ..self }
+    pub fn stopped_by(self, stop: Option<&'a Stop>) -> LightPaths<'a> {
+        LightPaths { stop, ..self }
     }
 
     /// Whether the iteration is aborted. Checked at every few paths only, by `index`, the number of the path.
@@ -281,6 +281,7 @@ struct Deposit<'a> {
     weight: Option<f32>,
     /// Number of vertices of the path so far.
     vertices: u32,
+    stop: Option<&'a Stop>,
 }
 
 impl<'a> Deposit<'a> {
@@ -288,7 +289,7 @@ impl<'a> Deposit<'a> {
     fn new(
         scene: &'a Scene,
         photons: &'a mut Photons,
-        paths: &LightPaths,
+        paths: &LightPaths<'a>,
         emitted: &Emitted,
         probability: f32,
     ) -> Deposit<'a> {
@@ -311,6 +312,7 @@ impl<'a> Deposit<'a> {
             scale: 1.0,
             weight: paths.guide.is_some().then_some(emitted.weight),
             vertices: 0,
+            stop: paths.stop,
         }
     }
 
@@ -333,6 +335,11 @@ impl<'a> Deposit<'a> {
 }
 
 impl<'a> Visitor<'a> for Deposit<'_> {
+    #[inline]
+    fn stop(&self) -> Option<&Stop> {
+        self.stop
+    }
+
     #[inline]
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         self.inside_solid &= vertex.shading.bsdf.transmits();

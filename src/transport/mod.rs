@@ -64,4 +64,4 @@ pub use vertex::{MediumLight, MediumVertex, Next, Scattered, Vertex, Visitor};
 pub use vertex_counts::VertexCounts;
 pub use visible::visible_surface;
 pub use volume::Volume;
-pub use walk::{PathStart, walk};
+pub use walk::{CUT_INTERVAL, PathStart, walk};

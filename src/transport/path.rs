@@ -25,6 +25,7 @@ use crate::medium::FlightDensity;
 use crate::plan::{ClassSet, LightPrefix, Part};
 use crate::random::{Purpose, Stream};
 use crate::scene::Scene;
+use crate::stop::Stop;
 use crate::trace::Tracer;
 use bumpalo::Bump;
 
@@ -44,6 +45,7 @@ struct PathTracer<'a, R> {
     /// are in the photograph below the picture.
     on_catcher: bool,
     record: &'a mut R,
+    stop: Option<&'a Stop>,
 }
 
 impl<R: PathRecorder> PathTracer<'_, R> {
@@ -162,6 +164,11 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
     #[inline]
     fn spared(&self) -> f32 {
         SPARED_BY_ROULETTE
+    }
+
+    #[inline]
+    fn stop(&self) -> Option<&Stop> {
+        self.stop
     }
 
     #[inline]
@@ -295,12 +302,12 @@ pub fn path_sample(
 ) {
     *sample = PixelSample::default();
     let history = PathHistory::START;
-    let CameraPaths { scene, max_depth, splits, classes, .. } = *camera_paths;
+    let CameraPaths { scene, max_depth, splits, classes, stop, .. } = *camera_paths;
     let lobes = camera_paths.lobes.then(LobeHistory::default);
     let last = Receiver::anywhere(start.origin);
     let (depth, on_catcher) = (0, false);
     let mut tracer =
-        PathTracer { scene, max_depth, splits, classes, lobes, sample, history, last, depth, on_catcher, record };
+        PathTracer { scene, max_depth, splits, classes, lobes, sample, history, last, depth, on_catcher, record, stop };
     walk(camera_paths.scene, arena, start, *stream, Transport::Radiance, camera_paths.max_depth, &mut tracer);
 }
 

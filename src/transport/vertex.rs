@@ -12,6 +12,7 @@ use crate::medium::{FlightDensity, HenyeyGreenstein};
 use crate::random::Draws;
 use crate::scene::Scene;
 use crate::spectrum::Wavelength;
+use crate::stop::Stop;
 
 /// A vertex of a path on a surface. References with lifetime `'a` outlive the walk.
 pub struct Vertex<'v, 'a> {
@@ -189,6 +190,11 @@ pub trait Visitor<'a>: Sized {
     #[inline]
     fn splits(&self) -> u32 {
         0
+    }
+    /// The switch that ends paths early; `None` if there is none.
+    #[inline]
+    fn stop(&self) -> Option<&Stop> {
+        None
     }
     /// Lets `follow` trace one branch of the path, and restores the visitor's state of the path afterwards. Visitors whose
     /// paths are split implement it.

@@ -18,7 +18,11 @@ use crate::random::{Draws, Purpose, Stream};
 use crate::scene::Scene;
 use crate::scene::contact::ContactPoint;
 use crate::spectrum::{SPREAD, Wavelength, WavelengthSample};
+use crate::stop::Stop;
 use bumpalo::Bump;
+
+/// Number of vertices between two checks whether a path must end early.
+pub const CUT_INTERVAL: u32 = 16;
 
 /// The start of a camera path or light path.
 #[derive(Clone, Copy, Debug)]
@@ -186,7 +190,7 @@ impl<'a> Path<'a> {
     #[inline(always)]
     fn follow<V: Visitor<'a>, const BESIDES: u8>(&mut self, first: &PrecomputedHit, visitor: &mut V) {
         let mut known = first;
-        while self.depth <= self.max_depth {
+        while self.depth <= self.max_depth && !self.is_cut(visitor) {
             let (end, flight) = self.travel::<V, BESIDES>(known, visitor);
             known = &PrecomputedHit::Unknown;
             if self.scene.survey.hidden_solids && self.depth == 1 && self.transport == Transport::Radiance {
@@ -206,6 +210,12 @@ impl<'a> Path<'a> {
             }
             self.depth += 1;
         }
+    }
+
+    /// Whether the path ends early. Checked at every few vertices only, so that most paths never ask.
+    #[inline(always)]
+    fn is_cut<V: Visitor<'a>>(&self, visitor: &V) -> bool {
+        self.depth.is_multiple_of(CUT_INTERVAL) && visitor.stop().is_some_and(Stop::should_end_path)
     }
 
     /// [`Path::follow`] for paths that may split, and for their branches.

@@ -94,7 +94,8 @@ fn write_white_room(folder: &Folder) {
 }
 
 /// `auto` takes a method whose iterations are short and fit into memory. A named method whose first iteration would take
-/// hours, or whose photons fit into no memory, names the option that shortens light paths.
+/// minutes cuts its paths when the time is up and says so; one whose photons fit into no memory ends. Both name the
+/// option that shortens paths.
 #[test]
 fn closed_white_rooms_are_rendered_or_name_max_depth() {
     let folder = Folder::new();
@@ -102,9 +103,18 @@ fn closed_white_rooms_are_rendered_or_name_max_depth() {
     let render = "render room.gltf -o out.exr --width 16 --height 9 --denoise none --progress none";
     let auto = folder.run(&format!("{render} --time 1"));
     assert_eq!(auto.code, Some(0), "{}", auto.stderr);
-    let vcm = folder.run(&format!("{render} --method vcm --time 1"));
-    assert_eq!(vcm.code, Some(2), "{}", vcm.stderr);
-    assert!(vcm.stderr.contains("has not ended after 8 s") && vcm.stderr.contains("--max-depth"), "{}", vcm.stderr);
+    let said = "paths were cut after 16 segments";
+    for method in ["vcm", "sppm --photons 1000"] {
+        let cut = folder.run(&format!("{render} --method {method} --time 1 --checkpoint out.checkpoint"));
+        assert_eq!(cut.code, Some(0), "{method}: {}", cut.stderr);
+        assert!(cut.stderr.contains(said) && cut.stderr.contains("--max-depth"), "{method}: {}", cut.stderr);
+        let (set, header) = folder.read("out.exr");
+        assert!(header["iterations"] == 1 && header["warnings"].to_string().contains(said), "{method}: {header}");
+        assert!(values(&set, "").iter().any(|value| value[0] > 0.0), "{method}: the picture is black");
+        assert!(!folder.path("out.checkpoint").exists(), "{method}: a render could continue without the light");
+    }
+    let shard = folder.run(&format!("{render} --method bdpt --time 1 --shard 0/2"));
+    assert!(shard.code == Some(2) && shard.stderr.contains(said), "{}", shard.stderr);
     let few = limited(&folder, "ulimit -v 3000000", &format!("{render} --method vcm --width 640 --height 360"));
     assert_eq!(few.code, Some(1), "{}", few.stderr);
     assert!(few.stderr.contains("need about") && few.stderr.contains("--max-depth"), "{}", few.stderr);

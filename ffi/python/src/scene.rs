@@ -361,7 +361,7 @@ impl Observer for CallerReports<'_> {
             Event::SaveFailed(error) => {
                 self.caller.warn(&[format!("the state of the render is not saved: {error}; the render goes on")]);
             }
-            Event::FewMoments(warning) => self.caller.warn(&[warning.into()]),
+            Event::Warning(warning) => self.caller.warn(&[warning.into()]),
             Event::MomentFailed(error) => {
                 self.caller.warn(&[format!("{error}; the render ends here, with the iterations so far")]);
             }

@@ -144,7 +144,7 @@ impl Observer for Reports<'_> {
             Event::MomentFailed(error) => {
                 say(&format!("warning: {error}; the render ends here, with the iterations so far"));
             }
-            Event::FewMoments(warning) => say(&format!("warning: {warning}")),
+            Event::Warning(warning) => say(&format!("warning: {warning}")),
             Event::Rendered(rendered) => {
                 self.reporter.take().into_iter().for_each(|mut reporter| reporter.finish());
                 self.summary = Some(Summary::of(rendered));

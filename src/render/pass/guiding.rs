@@ -148,6 +148,7 @@ fn trace_photons(
     let paths_of_round = LightPaths::new(seed, index, Domain::GuideLight, light_paths, camera_paths.max_depth)
         .guided(Some(guide))
         .lighting(region)
+        .stopped_by(camera_paths.stop)
         .wanting(ClassSet::ALL, camera_paths.indirect);
     let trace = |paths: std::ops::Range<u32>| {
         let (mut photons, mut arena, mut guided) =

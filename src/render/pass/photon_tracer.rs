@@ -139,7 +139,7 @@ impl PhotonTracer {
             .lighting(self.region)
             .wanting(settings.photon_classes(&scene.survey), settings.indirect)
             .with(IterationWavelengths::new(seed, i))
-            .stopped_by(&settings.stop)
+            .stopped_by(Some(&settings.stop))
     }
 
     /// Makes the pixels before the first iteration. Their bandwidths come from a pilot, if the settings derive them
@@ -184,7 +184,7 @@ fn channel_map(
     // The channels share no random numbers.
     let paths = LightPaths::new(seed, 3 * i + channel, Domain::Light, (photons / 3).max(1), max_depth)
         .with(IterationWavelengths::new(seed, i))
-        .stopped_by(&settings.stop)
+        .stopped_by(Some(&settings.stop))
         .wanting(settings.photon_classes(&scene.survey), Indirect::Photons);
     let trace = || {
         flux.map_or(Photons::default(), |flux| {

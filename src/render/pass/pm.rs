@@ -126,7 +126,7 @@ impl Pm {
         let start = cpu_seconds();
         let pass = LightPaths::new(seed, 1, Domain::Light, photons, max_depth)
             .wanting(settings.photon_classes(&scene.survey), Indirect::Photons)
-            .stopped_by(&settings.stop);
+            .stopped_by(Some(&settings.stop));
         let most = usize::try_from(photon_memory / PHOTON_BYTES).unwrap_or(usize::MAX).min(u32::MAX as usize);
         let (photons, traced, lost) = trace(scene, initial_media, &pass, most);
         phases.light += cpu_seconds() - start;

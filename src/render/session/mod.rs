@@ -46,7 +46,8 @@ impl<'a> Session<'a> {
     /// render.
     pub fn with_time_spent(input: &'a RenderInput<'a>, mut time: TimeSpent) -> Session<'a> {
         let RenderInput { scene, settings, initial_media, .. } = input;
-        settings.stop.start_iteration(settings.first_iteration_limit().map(|limit| limit - time.seconds));
+        settings.stop.forget_cuts();
+        settings.stop.start_first_iteration(settings.time.map(|limit| limit - time.seconds));
         let (integrator, pixels) = time.measure(|| {
             let mut integrator = integrator(input);
             let pixels = integrator.pixels(input);
@@ -90,11 +91,21 @@ impl<'a> Session<'a> {
 
     /// Renders one iteration; discards it and returns false if it takes more than `seconds` or the user stops it.
     pub fn step_within(&mut self, seconds: Option<f64>) -> bool {
+        self.settings().stop.start_iteration(seconds);
+        self.run_iteration()
+    }
+
+    /// Renders one iteration, whose long paths are cut after `seconds`; returns false if the user stops it.
+    fn step_or_cut(&mut self, seconds: Option<f64>) -> bool {
+        self.settings().stop.start_first_iteration(seconds);
+        self.run_iteration()
+    }
+
+    fn run_iteration(&mut self) -> bool {
         if self.settings().stop.requested() {
             return false;
         }
         let mut time = self.counters.stats.time;
-        self.settings().stop.start_iteration(seconds);
         let done = time.measure(|| self.iterate());
         self.counters.stats.time = time;
         if done && self.is_record_due() {
@@ -206,6 +217,11 @@ impl<'a> Session<'a> {
     /// Accumulated samples of each pixel, row by row from the top.
     pub fn pixels(&self) -> &[PixelAccumulator] {
         &self.pixels
+    }
+
+    /// Whether the limit of time has cut long paths, so that the picture lacks their light.
+    pub fn has_cut_paths(&self) -> bool {
+        self.settings().stop.has_cut_paths()
     }
 
     /// Whether the scene has no lights, so that the black picture is right.

@@ -13,11 +13,6 @@ use crate::scene::Scene;
 /// variance.
 pub const MIN_ITERATIONS_FOR_ERROR: u64 = 2 * QUARTERS as u64;
 
-/// Times the limit [`Settings::time`] that the first iteration may take, because a picture needs one.
-const FIRST_ITERATION_FACTOR: f64 = 8.0;
-/// Smallest limit that [`FIRST_ITERATION_FACTOR`] applies to (seconds).
-const MIN_FIRST_LIMIT: f64 = 1.0;
-
 /// Renders a picture. `observe` is called after every iteration with the progress and the pixels, and may stop the render.
 ///
 /// Methods without bandwidth levels render one level. `settings.photons` applies to methods for which
@@ -45,9 +40,10 @@ pub fn run_session<'a>(
         if session.is_finished() {
             return StopReason::Iterations;
         }
-        let limit = if session.iterations() > 0 { settings.time } else { settings.first_iteration_limit() };
-        let left = limit.map(|time| time - session.spent().seconds);
-        if !session.step_within(left) {
+        let left = settings.time.map(|time| time - session.spent().seconds);
+        // A picture needs one iteration.
+        let done = if session.iterations() > 0 { session.step_within(left) } else { session.step_or_cut(left) };
+        if !done {
             return if settings.stop.requested() || session.failure.is_some() {
                 StopReason::Interrupted
             } else {
@@ -56,6 +52,7 @@ pub fn run_session<'a>(
         }
         let progress = session.progress();
         match observe(&progress, session) {
+            Control::Continue if session.has_cut_paths() => return StopReason::Time,
             Control::Continue => {}
             Control::Stop => return StopReason::Interrupted,
             Control::Reached => return StopReason::Error,
@@ -70,12 +67,6 @@ pub fn run_session<'a>(
 }
 
 impl Settings {
-    /// Seconds after which a render stops without a picture, because not even its first iteration has ended. `None`
-    /// without a limit of time.
-    pub fn first_iteration_limit(&self) -> Option<f64> {
-        self.time.map(|time| FIRST_ITERATION_FACTOR * time.max(MIN_FIRST_LIMIT))
-    }
-
     /// The reason to stop after `seconds` with the estimated relative error `error`; `None` to continue.
     fn stop_reason(&self, seconds: f64, error: Option<f64>) -> Option<StopReason> {
         if self.time.is_some_and(|t| seconds >= t) {
