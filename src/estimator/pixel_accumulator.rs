@@ -6,7 +6,7 @@ use crate::photon::ByKind;
 use crate::random;
 use crate::stat::sum::Term;
 use crate::stat::{Grids, Moments, Sum, Total, variance_of_mean};
-use crate::transport::{Cause, LobeLayer, LobeLight, MAX_LEVELS, PixelSample};
+use crate::transport::{Cause, INNER_AREAS, LobeLayer, LobeLight, MAX_LEVELS, PixelSample};
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 
@@ -67,7 +67,8 @@ pub struct PixelAccumulator {
     /// Moments of the bandwidth levels except the picture level, smallest bandwidth first, and, as the last entry, of
     /// the difference between the next larger level and the picture level. Levels are correlated, so the variance of
     /// the difference does not follow from theirs. In media the difference is scaled to equal the bias
-    /// ([`super::SquaredError`]). Empty if the pixel has one level.
+    /// ([`super::SquaredError`]). With one level that merges, only the difference to the inner photons
+    /// ([`PixelSample::merge_difference`]); with one level otherwise, empty.
     others: Box<[Moments]>,
     /// Sums over iterations of emission, direct, caustic and indirect light, and light from media.
     parts: [Sum<DVec3>; PARTS],
@@ -121,8 +122,15 @@ impl PixelAccumulator {
     /// light are exact on grids in units of 2^`exponent`: if all light of the scene is scaled by a power of two, and
     /// `exponent` with it, the sums scale exactly ([`Grids::new`]).
     pub fn new(levels: usize, exponent: i32, bandwidths: ByKind<f32>) -> PixelAccumulator {
-        let others = vec![Moments::default(); PixelAccumulator::others(levels)].into_boxed_slice();
+        let others = vec![Moments::default(); PixelAccumulator::others(levels, false)].into_boxed_slice();
         PixelAccumulator { grids: Grids::new(exponent), others, bandwidths, ..PixelAccumulator::default() }
+    }
+
+    /// Adds empty moments of the difference that shows the bias of merging with one bandwidth, if `merges` is true.
+    #[must_use]
+    pub fn with_merges(self, merges: bool) -> PixelAccumulator {
+        let others = vec![Moments::default(); PixelAccumulator::others(self.levels(), merges)].into_boxed_slice();
+        PixelAccumulator { others, ..self }
     }
 
     /// Replaces the sums of light groups by empty sums for `groups` light groups.
@@ -142,32 +150,32 @@ impl PixelAccumulator {
         self.lobes.is_some()
     }
 
-    /// Memory in bytes of an accumulator with `levels` bandwidth levels and `groups` light groups, and with sums by the
-    /// lobe of the first hit if `lobes` is true.
-    pub fn bytes(levels: usize, groups: usize, lobes: bool) -> usize {
+    /// Memory in bytes of an accumulator with `levels` bandwidth levels (the only one merges if `merges` is true) and
+    /// `groups` light groups, and with sums by the lobe of the first hit if `lobes` is true.
+    pub fn bytes(levels: usize, merges: bool, groups: usize, lobes: bool) -> usize {
         size_of::<PixelAccumulator>()
-            + PixelAccumulator::others(levels) * size_of::<Moments>()
+            + PixelAccumulator::others(levels, merges) * size_of::<Moments>()
             + groups * size_of::<[Sum<DVec3>; 2]>()
             + if lobes { size_of::<LobeSums>() } else { 0 }
     }
 
     /// Memory of this accumulator in bytes.
     pub fn size(&self) -> usize {
-        PixelAccumulator::bytes(self.levels(), self.groups.len(), self.lobes.is_some())
+        PixelAccumulator::bytes(self.levels(), self.others.len() == 1, self.groups.len(), self.lobes.is_some())
     }
 
-    /// Whether the accumulator has sums for exactly `levels` bandwidth levels and `groups` light groups, and sums by the
-    /// lobe of the first hit exactly if `lobes` is true.
-    pub fn holds(&self, levels: usize, groups: usize, lobes: bool) -> bool {
-        self.others.len() == PixelAccumulator::others(levels)
+    /// Whether the accumulator has sums for exactly `levels` bandwidth levels (the only one merges if `merges` is true)
+    /// and `groups` light groups, and sums by the lobe of the first hit exactly if `lobes` is true.
+    pub fn holds(&self, levels: usize, merges: bool, groups: usize, lobes: bool) -> bool {
+        self.others.len() == PixelAccumulator::others(levels, merges)
             && self.groups.len() == groups
             && self.lobes.is_some() == lobes
     }
 
-    /// Length of the field `others` for a number of bandwidth levels: all levels but one, plus one difference; 0 for
-    /// one level.
-    fn others(levels: usize) -> usize {
-        if levels > 1 { levels } else { 0 }
+    /// Length of the field `others` for a number of bandwidth levels: all levels but one, plus one difference; for one
+    /// level 1 if it merges, and 0 otherwise.
+    fn others(levels: usize, merges: bool) -> usize {
+        if levels > 1 { levels } else { usize::from(merges) }
     }
 
     /// Number of bandwidth levels of the pixel, at least 1.
@@ -205,10 +213,13 @@ impl PixelAccumulator {
     }
 
     /// Mean over iterations of the radiance of the next larger bandwidth level minus that of the picture level, and the
-    /// variance of this mean; `None` with one level.
+    /// variance of this mean. With one level that merges, the radiance minus that of merging within a quarter of the
+    /// radius; with one level otherwise, `None`.
     pub fn difference(&self) -> Option<[DVec3; 2]> {
         let count = f64::from(self.iterations);
-        self.others.last().map(|difference| [difference.mean(count), difference.variance_of_mean(count)])
+        let scale = if self.others.len() == 1 { f64::from(INNER_AREAS) } else { 1.0 };
+        let of = |moments: &Moments| [moments.mean(count) * scale, moments.variance_of_mean(count) * (scale * scale)];
+        self.others.last().map(of)
     }
 
     /// Sum over all iterations of the radiance of the picture level, the bandwidth level that the picture shows.
@@ -335,7 +346,10 @@ impl PixelAccumulator {
             sample.indirect + sample.indirect_photons[level],
             sample.volume + sample.volume_photons[level],
         ];
-        let difference = if count > 1 { self.difference_of(&values, independent, correlated) } else { Rgb::ZERO };
+        let difference = match count {
+            1 => independent.merge_difference,
+            _ => self.difference_of(&values, independent, correlated),
+        };
         let (mut most, mut finite) = (Rgb::ZERO, true);
         let by_lobe = lobes.map_or(&[][..], |lobes| &lobes.layers);
         for list in [&values[..count], &parts, &[difference], groups.as_flattened(), by_lobe] {
@@ -544,6 +558,7 @@ mod tests {
                 indirect_photons: photons(20),
                 volume: draw(3),
                 volume_photons: photons(30),
+                merge_difference: draw(9),
                 features: Features {
                     albedo: draw(4).normalize() * 0.9,
                     normal: (draw(5) - draw(6)).normalize(),

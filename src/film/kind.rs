@@ -30,6 +30,9 @@ pub const LOBE_LAYERS: [(LobeLayer, &str); LobeLayer::ALL.len()] = [
 /// Names of the layers with the albedos of the diffuse, glossy and transmitting lobes at the first hit.
 pub const LOBE_COLORS: [&str; 3] = ["DiffuseColor", "GlossyColor", "TransmissionColor"];
 
+/// Name of the layer with the estimated squared bias of merging with one bandwidth.
+pub const SQUARED_BIAS: &str = "SquaredBias";
+
 /// Name of the layer with motion vectors.
 pub const MOTION: &str = "Motion";
 
@@ -382,6 +385,14 @@ pub static LAYERS: &[LayerKind] = &[
         name: "Quarter",
         suffix: Suffix::Quarter,
         meaning: "Noisy by every fourth iteration: four independent pictures; only if asked for by name",
+        finish: Some(Use::Error),
+        on_request: true,
+        ..LayerKind::COLOUR
+    },
+    LayerKind {
+        name: SQUARED_BIAS,
+        unit: "(W/(sr m^2))^2",
+        meaning: "squared bias of merging with one bandwidth, whose noise may be negative; only if asked for by name",
         finish: Some(Use::Error),
         on_request: true,
         ..LayerKind::COLOUR

@@ -10,7 +10,7 @@
 //! - `depth` is the mean over the camera paths that have a first rough hit, and 1e10 if none has; `albedo` and `normal`
 //!   are zero then.
 
-use super::kind::{CAUSTIC, LIGHT_GROUP, LOBE_COLORS, LOBE_LAYERS, kind_of};
+use super::kind::{CAUSTIC, LIGHT_GROUP, LOBE_COLORS, LOBE_LAYERS, SQUARED_BIAS, kind_of};
 use super::layers::{Layer, LayerSet, Plane, Sample};
 use crate::error::Result;
 use crate::estimator::{BandwidthState, FAR, Parts, PixelAccumulator, QUARTERS, SquaredError, variance_ratio};
@@ -34,6 +34,8 @@ pub struct Shape {
     pub compared: usize,
     /// Index, from 0, of the bandwidth level that is the method's own image.
     pub own: usize,
+    /// Whether photons are merged with one bandwidth, so that the inner part of its photons shows the bias.
+    pub merges: bool,
     /// Whether photons of each kind have bandwidths; merged light paths count as the first kind.
     pub kinds: ByKind<bool>,
     /// Whether an environment light is visible.
@@ -167,6 +169,10 @@ fn columns(shape: &Shape) -> Vec<Column> {
     for quarter in 0..QUARTERS {
         columns.push(Column::rgb(format!("Quarter{}", quarter + 1), move |p| p.quarter(quarter)));
     }
+    if shape.merges {
+        let bias = move |p: &PixelAccumulator| SquaredError::of(p, own, compared).map(|error| error.squared_bias);
+        columns.push(Column::noise(SQUARED_BIAS, move |at| bias(at.pixel).unwrap_or_default()));
+    }
     columns.extend(part_columns(shape));
     columns.extend([
         Column::noise("Error", move |at| match SquaredError::of(at.pixel, own, compared) {
@@ -291,6 +297,7 @@ mod tests {
             levels: 5,
             compared: 5,
             own: 3,
+            merges: false,
             kinds: [true; 2],
             environment: false,
             classes: ClassSet::ALL,
@@ -313,6 +320,7 @@ mod tests {
             indirect_photons: photons,
             volume: Rgb::splat(0.3 * x),
             volume_photons: photons.map(|light| light * 0.7),
+            merge_difference: Rgb::splat(0.1 * x),
             features: if hit {
                 Features { albedo: Rgb::splat(0.5), normal: Vec3::Y, depth: 4.0, share: 1.0 }
             } else {

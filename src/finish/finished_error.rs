@@ -14,7 +14,8 @@
 //! Bias that all quarters share is estimated from two bandwidth levels. The next larger level has twice the squared
 //! bandwidth and so twice the bias \[Knaus and Zwicker 2011, 3\]: the difference of the two is the bias itself. Bias is
 //! smooth and most of the two levels' noise is common, so that means over windows show it. In media, where squared
-//! bandwidths are a factor 2^(2/3) apart, the difference is 0.59 of the bias.
+//! bandwidths are a factor 2^(2/3) apart, the difference is 0.59 of the bias. With one bandwidth, pixels estimate their
+//! squared bias themselves (`estimator/error.rs`), and windows average it.
 
 use super::window::Windows;
 use crate::film::{Picture, Size, channel_mean};
@@ -43,7 +44,7 @@ pub struct FinishedError {
     pub noise: f64,
     /// Standard error of `noise`.
     pub deviation: f64,
-    /// Squared relative bias that all quarters share; zero without bandwidth levels.
+    /// Squared relative bias that all quarters share; zero if there is no other bandwidth to compare with.
     pub bias: f64,
     /// Share of the estimate's variance in the pixels left out of `noise`, 0 to 1. Near one a few bright samples hold
     /// all noise, and no sample so far predicts how much light others like them will add.
@@ -86,6 +87,8 @@ pub struct ErrorEstimator<'a> {
     pub deviation: &'a Picture,
     /// The bandwidth level that is the method's own image, and the next larger; `None` without levels.
     pub levels: Option<[&'a Picture; 2]>,
+    /// Estimated squared bias of every pixel, with noise around zero; `None` with levels or without bias.
+    pub squared_bias: Option<&'a Picture>,
 }
 
 impl ErrorEstimator<'_> {
@@ -118,22 +121,27 @@ impl ErrorEstimator<'_> {
         FinishedError {
             noise: products.average(&products.error),
             deviation: (self.squared_block_sums(products) / CONTROL_VARIANCE).sqrt() / products.count,
-            bias: bias.map_or(0.0, |bias| products.average(bias)),
+            bias: bias.map_or(0.0, |bias| products.average(bias).max(0.0)),
             rare: products.rare,
             unseen: 0.0,
         }
     }
 
-    /// Squared relative bias of every pixel: the squared difference of the two bandwidth levels, averaged over windows;
-    /// `None` without levels.
+    /// Squared relative bias of every pixel, averaged over windows: the squared difference of the two bandwidth levels, or
+    /// the estimate of the pixels themselves; `None` without either.
     fn bias(&self, products: &Products) -> Option<Picture> {
-        let [own, larger] = self.levels?;
-        let difference = Picture::from_fn(self.size(), |i| {
-            let weight = products.weight[i].sqrt();
-            std::array::from_fn(|c| ((f64::from(larger[i][c]) - f64::from(own[i][c])) * weight) as f32)
-        });
-        let smooth = Windows::new(self.size(), REACH, &products.kept).means(&difference);
-        Some(Picture::new(self.size(), smooth).map(|d| d * d))
+        let windows = Windows::new(self.size(), REACH, &products.kept);
+        let relative = |of: &(dyn Fn(usize, usize, f64) -> f64 + Sync)| {
+            Picture::from_fn(self.size(), |i| std::array::from_fn(|c| of(i, c, products.weight[i]) as f32))
+        };
+        if let Some([own, larger]) = self.levels {
+            let apart = |i: usize, c: usize| f64::from(larger[i][c]) - f64::from(own[i][c]);
+            let smooth = windows.means(&relative(&|i, c, weight| apart(i, c) * weight.sqrt()));
+            return Some(Picture::new(self.size(), smooth).map(|d| d * d));
+        }
+        let squared = self.squared_bias?;
+        let squared = relative(&|i, c, weight| f64::from(squared[i][c]) * weight);
+        Some(Picture::new(self.size(), windows.means(&squared)))
     }
 
     /// Squared errors of every pixel: a mean of the window's own `p` and of the error predicted from the variance of
@@ -163,7 +171,9 @@ impl ErrorEstimator<'_> {
             })
         });
         let mut bias = bias.unwrap_or_else(|| Picture::filled(self.size(), [0.0; 3]));
-        bias.iter_mut().zip(weight).for_each(|(bias, weight)| *bias = bias.map(|b| (f64::from(b) / weight) as f32));
+        bias.iter_mut()
+            .zip(weight)
+            .for_each(|(bias, weight)| *bias = bias.map(|b| (f64::from(b.max(0.0)) / weight) as f32));
         ErrorMap { noise, bias, weight: products.weight.into_iter().map(|w| w as f32).collect() }
     }
 
@@ -264,7 +274,8 @@ mod tests {
     ) -> (FinishedError, ErrorMap) {
         let quarters = [1, 2, 3, 4].map(|k| noisy(10 * seed + k, sigma));
         let deviation = Picture::from_fn(SIZE, |i| [0.5 * sigma(i); 3]);
-        ErrorEstimator { half, quarters: &quarters, deviation: &deviation, levels: None }.error_and_map()
+        ErrorEstimator { half, quarters: &quarters, deviation: &deviation, levels: None, squared_bias: None }
+            .error_and_map()
     }
 
     /// Pictures that are off by a tenth, with quarters whose noise is three times that: the estimated error is right,
@@ -321,7 +332,14 @@ mod tests {
         let mut deviation = grey(0.025);
         deviation[777] = [2.5e4; 3];
         let half = grey(1.1);
-        let error = ErrorEstimator { half: &half, quarters: &quarters, deviation: &deviation, levels: None }.error();
+        let error = ErrorEstimator {
+            half: &half,
+            quarters: &quarters,
+            deviation: &deviation,
+            levels: None,
+            squared_bias: None,
+        }
+        .error();
         assert!(error.rare > 0.99, "{}", error.rare);
         assert!((error.noise / (0.01 / (1.01 * 1.21)) - 1.0).abs() < 0.05, "{}", error.noise);
         assert!(error.noise.is_finite() && error.deviation.is_finite());
@@ -336,7 +354,8 @@ mod tests {
         let levels = Some([&own, &larger]);
         let (half, deviation) = (grey(1.0), grey(0.1));
         let (error, map) =
-            ErrorEstimator { half: &half, quarters: &quarters, deviation: &deviation, levels }.error_and_map();
+            ErrorEstimator { half: &half, quarters: &quarters, deviation: &deviation, levels, squared_bias: None }
+                .error_and_map();
         assert!((error.bias / (0.01 / 1.01) - 1.0).abs() < 1e-3, "{}", error.bias);
         assert!(map.bias.iter().flatten().all(|b| (b / 0.01 - 1.0).abs() < 1e-3));
         let fall = 2f32.powf(-0.7);

@@ -32,7 +32,7 @@ pub use window::{Windows, window};
 use crate::combine::{Combiner, LevelStack};
 use crate::error::{Error, Result};
 use crate::estimator::QUARTERS;
-use crate::film::kind::Use;
+use crate::film::kind::{SQUARED_BIAS, Use};
 use crate::film::{
     CAUSTIC, LIGHT_GROUP, LOBE_COLORS, Layer, LayerSet, Picture, Size, finished_part, kind_of, lobe_names, part_names,
 };
@@ -165,6 +165,8 @@ pub struct ErrorSource {
     quarters: [Picture; QUARTERS],
     /// The method's own bandwidth level and the next larger one, if the picture has both.
     levels: Option<[Picture; 2]>,
+    /// Squared bias of merging with one bandwidth, if the picture has this layer.
+    squared_bias: Option<Picture>,
 }
 
 impl ErrorSource {
@@ -173,7 +175,8 @@ impl ErrorSource {
     fn of(set: &LayerSet, level: usize) -> Option<ErrorSource> {
         let quarters = quarters(set)?;
         let [own, larger] = level_names(level).map(|name| set.picture(&name));
-        Some(ErrorSource { quarters, levels: own.zip(larger).map(|(own, larger)| [own, larger]) })
+        let levels = own.zip(larger).map(|(own, larger)| [own, larger]);
+        Some(ErrorSource { quarters, levels, squared_bias: set.picture(SQUARED_BIAS) })
     }
 
     /// The pictures in a file. `header` holds its layers, with or without values; `read` reads the named ones.
@@ -183,7 +186,7 @@ impl ErrorSource {
     pub fn read(header: &LayerSet, read: impl FnOnce(&[String]) -> Result<LayerSet>) -> Result<Option<ErrorSource>> {
         let level = own_level(header);
         let quarters = (1..=QUARTERS).map(|k| format!("Quarter{k}"));
-        let names: Vec<String> = quarters.chain(level_names(level)).collect();
+        let names: Vec<String> = quarters.chain(level_names(level)).chain([SQUARED_BIAS.into()]).collect();
         Ok(ErrorSource::of(&read(&names)?, level))
     }
 }
@@ -513,9 +516,10 @@ fn error_by_quarters(
     half: &Picture,
     wants_map: bool,
 ) -> (FinishedError, Option<ErrorMap>) {
-    let ErrorSource { quarters, levels } = source;
+    let ErrorSource { quarters, levels, squared_bias } = source;
     let levels = levels.as_ref().map(|levels| levels.each_ref());
-    let estimator = ErrorEstimator { half, quarters, deviation: &estimate.deviation, levels };
+    let squared_bias = squared_bias.as_ref();
+    let estimator = ErrorEstimator { half, quarters, deviation: &estimate.deviation, levels, squared_bias };
     if wants_map {
         let (error, map) = estimator.error_and_map();
         (error, Some(map))

@@ -60,6 +60,7 @@ impl SceneFacts {
         (*count, *own, *compared) == (levels.count, levels.picture_level(), part.settings.compared_levels())
             && (groups.is_empty() || method.has_techniques() && groups.len() <= MAX_GROUPS)
             && self.shape.lobes == part.settings.lobes
+            && self.shape.merges == part.settings.merges_one_level()
             && inside(x, part.size.0, width.min(MAX_SIZE))
             && inside(y, part.size.1, height.min(MAX_SIZE))
             && self.motion.as_ref().is_none_or(|motion| motion.len() == part.size.0 as usize * part.size.1 as usize)

@@ -120,7 +120,8 @@ impl Extent {
         let techniques = if settings.techniques { MAX_TECHNIQUES as u64 * BYTES_PER_TECHNIQUE } else { 0 };
         bytes_of_bandwidths(settings)
             + techniques
-            + (PixelAccumulator::bytes(settings.levels.count, self.groups, self.lobes) + sample_bytes(settings)) as u64
+            + (PixelAccumulator::bytes(settings.levels.count, settings.merges_one_level(), self.groups, self.lobes)
+                + sample_bytes(settings)) as u64
             + (self.channels * size_of::<f32>()) as u64
             + merged
             + splats
@@ -162,7 +163,8 @@ fn finish_bytes(size: (u32, u32), groups: usize, lobes: bool) -> u64 {
 pub(super) fn check_merge(part: &ShardResult, shape: &Shape, finishes: bool) -> Result<()> {
     let (width, height) = part.size;
     let (groups, levels) = (shape.groups.len(), part.settings.levels.count);
-    let pixel = PixelAccumulator::bytes(levels, groups, shape.lobes) + layers::channels(shape) * size_of::<f32>();
+    let pixel =
+        PixelAccumulator::bytes(levels, shape.merges, groups, shape.lobes) + layers::channels(shape) * size_of::<f32>();
     let finish = if finishes { finish_bytes(part.size, groups, shape.lobes) } else { 0 };
     let needed = pixels(part.size) * pixel as u64 + finish;
     let outcome = memory::require(needed, format_args!("the sums and layers of {width} x {height} pixels"));

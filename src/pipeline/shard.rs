@@ -96,12 +96,13 @@ impl ShardFile {
     /// The file is damaged, or the number of its pixels is not that of its picture.
     pub fn pixels(&mut self, path: &Path, mut each: impl FnMut(Vec<PixelAccumulator>)) -> Result<()> {
         let (levels, shape) = (self.part.settings.levels.count, &self.facts.shape);
+        let merges = self.part.settings.merges_one_level();
         let (groups, lobes) = (shape.groups.len(), shape.lobes);
         let (width, height) = self.part.size;
         let (whole, mut count) = (width as usize * height as usize, 0);
         let read = records::read_blocks(&mut self.file, |block: Vec<PixelAccumulator>| {
             count += block.len();
-            if count > whole || !block.iter().all(|pixel| pixel.holds(levels, groups, lobes)) {
+            if count > whole || !block.iter().all(|pixel| pixel.holds(levels, merges, groups, lobes)) {
                 return Err(io::ErrorKind::InvalidData.into());
             }
             each(block);

@@ -372,14 +372,15 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
             }
             if let (true, Some(photons)) = (techniques.camera_vertex_merges(vertex.depth), self.context.photons) {
                 let (presence, joins) = (vertex.presence(camera_paths.scene), self.joins(vertex.depth));
-                let sample = &mut *self.sample;
+                let PixelSample { direct, volume_photons, caustic_photons, indirect_photons, merge_difference, .. } =
+                    &mut *self.sample;
                 let add = |class: PathClass, level: usize, radiance: Rgb| {
                     *match class.part() {
-                        Part::Volume => &mut sample.volume_photons[level],
+                        Part::Volume => &mut volume_photons[level],
                         // With bidirectional photon mapping, which has one level.
-                        Part::Emission | Part::Direct => &mut sample.direct,
-                        Part::Caustic => &mut sample.caustic_photons[level],
-                        Part::Indirect => &mut sample.indirect_photons[level],
+                        Part::Emission | Part::Direct => &mut *direct,
+                        Part::Caustic => &mut caustic_photons[level],
+                        Part::Indirect => &mut indirect_photons[level],
                     } += radiance;
                 };
                 let merge = Merge {
@@ -394,7 +395,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
                     classes: camera_paths.classes,
                     longest: camera_paths.max_depth - vertex.depth,
                 };
-                if !merge.run(vertex, self.record, add) {
+                if !merge.run(vertex, self.record, add, merge_difference) {
                     self.sample.reject(Cause::Photons);
                 }
             }

@@ -53,7 +53,7 @@ pub use pass_through::{BulbHit, PassThroughHit};
 pub use path::{path_radiance, path_sample};
 pub use photon_batch::Scratch;
 pub use photon_merge::MergePhoton;
-pub use pixel_sample::{Features, PixelSample};
+pub use pixel_sample::{Features, INNER_AREAS, PixelSample};
 pub use probe::{GatherPoint, Probe};
 pub use roulette::{MAX_SPLITS, SPARED_BY_ROULETTE};
 pub use scattering_vertex::{ScatterPoint, lit_side};

@@ -4,6 +4,7 @@ use super::bidirectional::{MergeLevels, PathKind, PathRecorder, Technique};
 use super::interior::Presence;
 use super::lobe_layers::{FirstScatter, LobeHistory};
 use super::mis::{self, Merges, MisState};
+use super::pixel_sample::INNER_AREAS;
 use super::scattering_vertex::ScatterPoint;
 use super::shares::PhotonShares;
 use super::vertex::Vertex;
@@ -128,13 +129,15 @@ pub(super) struct Merge<'a> {
 
 impl Merge<'_> {
     /// Merges the photons around `vertex` at all bandwidth levels with one query. Calls `add(class, level, radiance)`
-    /// for each contribution. Returns whether all contributions are finite.
+    /// for each contribution, and adds the difference that shows the bias of one bandwidth to `difference`
+    /// ([`super::PixelSample::merge_difference`]). Returns whether all contributions are finite.
     #[inline]
     pub fn run<R: PathRecorder>(
         &self,
         vertex: &Vertex<'_, '_>,
         record: &mut R,
         mut add: impl FnMut(PathClass, usize, Rgb),
+        difference: &mut Rgb,
     ) -> bool {
         let radii = self.levels.radius2();
         let mut finite = true;
@@ -169,11 +172,14 @@ impl Merge<'_> {
                 if distance2 < radius2 {
                     let weight = ratios.merge_weight(eta);
                     let area = radius2 * self.levels.probability();
+                    let inner = f32::from(distance2 * INNER_AREAS < radius2);
                     for (class, share) in shares.iter() {
                         let light = value * share * (FRAC_1_PI / area);
                         let of = PathKind { class, group: photon.group, first };
                         record.arrival(technique, of, level, light, weight);
-                        add(class, level, value * share * (weight * FRAC_1_PI / area));
+                        let radiance = value * share * (weight * FRAC_1_PI / area);
+                        add(class, level, radiance);
+                        *difference += radiance * (1.0 / INNER_AREAS - inner);
                     }
                 }
             }

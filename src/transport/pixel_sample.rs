@@ -56,6 +56,9 @@ impl BranchFeatures {
     }
 }
 
+/// Area within the merging radius over that within a quarter of it, whose photons show the bias of merging.
+pub const INNER_AREAS: f32 = 16.0;
+
 /// The contribution of one camera path to its pixel. Radiance is linear RGB.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PixelSample {
@@ -73,6 +76,8 @@ pub struct PixelSample {
     pub volume: Rgb,
     /// Light whose first vertex (apart from clear ones) lies in a medium, as far as it depends on a bandwidth, by level.
     pub volume_photons: [Rgb; MAX_LEVELS],
+    /// With one bandwidth: merged light less its estimate within a quarter of the radius, over [`INNER_AREAS`].
+    pub merge_difference: Rgb,
     /// G-buffer of the camera path.
     pub features: Features,
     /// First visible hit of the camera path; `None` if it hits nothing.

@@ -1,8 +1,8 @@
 //! Which parts of the error an error estimate includes.
 //!
-//! The variance is estimated from independent iterations, the bias from the next larger of several bandwidth levels
-//! ([`crate::estimator::SquaredError`]). Without such a level, or with fixed gather points, the estimate lacks a part of
-//! the error, and a note beside the number says so.
+//! The variance is estimated from independent iterations, the bias from the next larger of several bandwidth levels, or
+//! from the inner part of one bandwidth ([`crate::estimator::SquaredError`]). Without either, or with fixed gather points,
+//! the estimate lacks a part of the error, and a note beside the number says so.
 
 use crate::render::settings::Settings;
 use serde::Serialize;
@@ -50,7 +50,7 @@ impl Settings {
         match self.method {
             method if method.has_fixed_points() => ErrorCoverage::PhotonNoise,
             method if method.has_one_map() => ErrorCoverage::Noise,
-            method if method.has_bandwidths() && !compared => ErrorCoverage::Noise,
+            method if method.has_bandwidths() && !compared && !self.merges_one_level() => ErrorCoverage::Noise,
             _ => ErrorCoverage::All,
         }
     }
@@ -62,7 +62,7 @@ mod tests {
     use crate::render::{Levels, Method, RadiusRule};
 
     #[test]
-    fn bias_is_included_if_there_is_a_larger_level_to_compare_with() {
+    fn bias_is_included_if_there_is_another_bandwidth_to_compare_with() {
         let coverage = |method: Method, levels: usize, radius_rule: RadiusRule| {
             Settings { method, levels: Levels::new(levels), radius_rule, ..Settings::default() }.error_coverage()
         };
@@ -71,7 +71,7 @@ mod tests {
         assert_eq!(coverage(Method::Sppm, 1, memoryless), ErrorCoverage::Noise);
         assert_eq!(coverage(Method::Sppm, 5, RadiusRule::Local), ErrorCoverage::Noise);
         assert_eq!(coverage(Method::Cppm, 5, memoryless), ErrorCoverage::Noise);
-        assert_eq!(coverage(Method::Vcm, 1, memoryless), ErrorCoverage::Noise);
+        assert_eq!(coverage(Method::Vcm, 1, memoryless), ErrorCoverage::All);
         assert_eq!(coverage(Method::Path, 1, memoryless), ErrorCoverage::All);
         assert_eq!(coverage(Method::Pm, 1, memoryless), ErrorCoverage::Noise);
         assert_eq!(coverage(Method::Ppm, 1, RadiusRule::Local), ErrorCoverage::PhotonNoise);

@@ -26,6 +26,7 @@ pub fn layer_shape_of(settings: &Settings, survey: &Survey, groups: &[String]) -
         levels: settings.levels.count,
         compared: settings.compared_levels(),
         own: settings.levels.picture_level(),
+        merges: settings.merges_one_level(),
         kinds: settings.bandwidth_kinds(survey),
         environment: survey.environment,
         classes: settings.classes,

@@ -20,6 +20,7 @@ struct Shared {
     direct: Rgb,
     indirect: Rgb,
     volume: Rgb,
+    merge_difference: Rgb,
     features: Features,
     first: Option<FirstHit>,
     rejection: Option<Cause>,
@@ -135,8 +136,9 @@ impl SampleBufferPart<'_> {
     /// Stores a sample at index `slot` of this part. Light at levels beyond those of the buffer is lost.
     #[inline]
     pub fn set(&mut self, slot: usize, sample: &PixelSample) {
-        let &PixelSample { emission, direct, indirect, volume, features, first, rejection, .. } = sample;
-        self.shared[slot] = Shared { emission, direct, indirect, volume, features, first, rejection };
+        let &PixelSample { emission, direct, indirect, volume, merge_difference, features, first, rejection, .. } =
+            sample;
+        self.shared[slot] = Shared { emission, direct, indirect, volume, merge_difference, features, first, rejection };
         for (level, into) in self.by_level[slot * self.levels..][..self.levels].iter_mut().enumerate() {
             *into = [sample.caustic_photons[level], sample.indirect_photons[level], sample.volume_photons[level]];
         }
@@ -176,9 +178,18 @@ pub(super) fn add<'g>(
 
 #[inline]
 fn unpack(shared: &Shared, by_level: &[OfLevel]) -> PixelSample {
-    let Shared { emission, direct, indirect, volume, features, first, rejection } = *shared;
-    let mut sample =
-        PixelSample { emission, direct, indirect, volume, features, first, rejection, ..PixelSample::default() };
+    let Shared { emission, direct, indirect, volume, merge_difference, features, first, rejection } = *shared;
+    let mut sample = PixelSample {
+        emission,
+        direct,
+        indirect,
+        volume,
+        merge_difference,
+        features,
+        first,
+        rejection,
+        ..PixelSample::default()
+    };
     for (level, &[caustic, indirect, volume]) in by_level.iter().enumerate() {
         sample.caustic_photons[level] = caustic;
         sample.indirect_photons[level] = indirect;
@@ -200,7 +211,7 @@ mod tests {
             let sample = |at: usize| {
                 let value = |k: usize| Rgb::new(at as f32, k as f32, 0.5);
                 let mut sample = PixelSample { emission: value(1), direct: value(2), ..PixelSample::default() };
-                (sample.indirect, sample.volume) = (value(3), value(4));
+                (sample.indirect, sample.volume, sample.merge_difference) = (value(3), value(4), value(6));
                 sample.features.depth = at as f32;
                 sample.first = at.is_multiple_of(2).then_some(FirstHit { p: value(5), instance: at as u32 });
                 sample.rejection = at.is_multiple_of(3).then_some(Cause::Sum);

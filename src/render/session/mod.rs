@@ -63,9 +63,9 @@ impl<'a> Session<'a> {
         let mut session = Session::new(input);
         let State { pixels, counters, passes } = state;
         let Settings { levels, lobes, .. } = &input.settings;
-        let groups = input.settings.light_groups(input.scene);
+        let (groups, merges) = (input.settings.light_groups(input.scene), input.settings.merges_one_level());
         let fits = pixels.len() == input.pixels()
-            && pixels.iter().all(|pixel| pixel.holds(levels.count, groups, *lobes))
+            && pixels.iter().all(|pixel| pixel.holds(levels.count, merges, groups, *lobes))
             && session.integrator.restore(&passes);
         fits.then(|| Session { pixels, counters, ..session })
     }

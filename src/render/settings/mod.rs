@@ -235,8 +235,11 @@ impl Settings {
     /// photons.
     pub(in crate::render) fn pixel_factory(&self, scene: &Scene) -> impl Fn(&ByKind<f32>) -> PixelAccumulator + use<> {
         let (levels, exponent) = (self.levels.count, scene.lights.irradiance_exponent());
-        let (groups, lobes) = (self.light_groups(scene), self.lobes);
-        move |bandwidths| PixelAccumulator::new(levels, exponent, *bandwidths).with_groups(groups).with_lobes(lobes)
+        let (groups, lobes, merges) = (self.light_groups(scene), self.lobes, self.merges_one_level());
+        move |bandwidths| {
+            let pixel = PixelAccumulator::new(levels, exponent, *bandwidths).with_merges(merges);
+            pixel.with_groups(groups).with_lobes(lobes)
+        }
     }
 
     /// All pixels before the first iteration, from their largest initial bandwidths by kind of photons; none if the user
@@ -316,6 +319,12 @@ impl Settings {
     /// machine.
     pub fn is_memoryless(&self) -> bool {
         self.bandwidth_rule().is_none_or(|rule| rule == BandwidthRule::Memoryless)
+    }
+
+    /// Whether photons are merged with one bandwidth, so that bias is estimated from the photons of its inner part.
+    pub fn merges_one_level(&self) -> bool {
+        let search = self.method.with_counts(&self.counts).search();
+        self.levels.count == 1 && matches!(search, Search::Merging | Search::ConnectionsAndMerging)
     }
 
     /// Number of bandwidth levels that keep a fixed ratio of bandwidths, so that bias is estimated from them. Under
