@@ -82,8 +82,8 @@ fn forecast_error(args: &PlanArgs, loaded: &Loaded, planned: &PlannedPicture, ta
     let view = View::new(&loaded.scene, &planned.camera);
     let settings = with_light_paths(planned.chosen.settings.clone(), args.options.photons, view.camera.whole()[0]);
     let mut finish = args.options.forecast_finish()?;
-    let spent = planned.chosen.spent().cpu_seconds;
-    let work = || forecast(view, &settings, &mut finish, target, spent);
+    let choice = planned.chosen.spent();
+    let work = || forecast(view, &settings, &mut finish, target, choice);
     Form::for_output(args.json).during("trying how the error falls", work)
 }
 

@@ -48,6 +48,12 @@ pub(super) fn estimate(
     Ok(Accuracy::fit(session.history()))
 }
 
+/// Number of error estimates of a render that reaches its target error after `iterations` iterations: one each time that
+/// their number has grown by a factor of the root of two ([`Session::is_recorded`]).
+pub(super) fn estimates_until(iterations: f64) -> f64 {
+    1.0 + (2.0 * (iterations / MIN_ITERATIONS_FOR_ERROR as f64).log2()).max(0.0).floor()
+}
+
 /// Progress with the error of the finished picture, and the time at which that error reaches the target, or half of its
 /// value if there is no target.
 pub(super) fn add_to_progress(
@@ -75,4 +81,26 @@ pub(super) fn is_reached(progress: &Progress, session: &Session<'_>, accuracy: O
     // A scene without lights is black, without any error.
     let error = error.or(session.has_no_lights().then_some(0.0));
     iterations >= MIN_ITERATIONS_FOR_ERROR && error.is_some_and(|error| error <= target)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::SQRT_2;
+
+    /// The number of estimates is that of the recorded moments until then, or one more.
+    #[test]
+    fn estimates_are_as_many_as_recorded_moments() {
+        let mut moments = vec![1u64];
+        while *moments.last().unwrap() < 10_000 {
+            moments.push((*moments.last().unwrap() as f64 * SQRT_2).ceil() as u64);
+        }
+        for iterations in [1, MIN_ITERATIONS_FOR_ERROR, 11, 16, 100, 9999] {
+            let until = iterations.max(MIN_ITERATIONS_FOR_ERROR);
+            let recorded =
+                moments.iter().filter(|&&at| (MIN_ITERATIONS_FOR_ERROR..=until).contains(&at)).count() as f64;
+            let more = estimates_until(iterations as f64) - recorded;
+            assert!((0.0..=1.0).contains(&more), "{iterations}: {recorded} and {more}");
+        }
+    }
 }

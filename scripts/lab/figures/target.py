@@ -1,5 +1,5 @@
-"""Renders with `--target-error`: the true error over the target, the time over the shortest possible time, and the times
-that the progress line and `caustique plan` predicted.
+"""Renders with `--target-error`: the true error over the target, the time over the shortest possible time, and the time
+that the progress line predicted. `outlook` has the predictions of `caustique plan`.
 
 The target is the geometric mean of the true errors of calibration.py's pictures at the last budget but one. The shortest
 time follows from the true errors at all budgets, interpolated in the logarithms. Times are wall-clock times, so the
@@ -13,7 +13,6 @@ from .. import accuracy
 from .. import references
 from ..accuracy import geometric, short
 from ..cache import program
-from ..commands import read
 from ..options import options as given
 from ..record import record
 
@@ -63,8 +62,6 @@ def measure(scene, method, truth):
     shortest = crossing(points, error)
     taken = statistics.mean(row["seconds"] for row in rows)
     late = [predicted for row in rows for share, predicted in row["predictions"] if share >= FROM]
-    options = ["--target-error", error, "--method", method, "--width", given.width, "--threads", given.threads]
-    outlook = read("plan", scene, *options).get("outlook")
     return {
         "scene": references.name(scene),
         "method": method,
@@ -74,14 +71,12 @@ def measure(scene, method, truth):
         "longer": taken / shortest,
         "predicted": statistics.median(late) if late else None,
         "right": sum(abs(predicted - 1) <= WITHIN for predicted in late) / len(late) if late else None,
-        "planned": outlook["seconds"] / taken if outlook else None,
     }
 
 
 def main():
     rows = []
     columns = {"target": 8, "true over it": 14, "seconds": 9, "over shortest": 15, "predicted": 11, "in 30 %": 9}
-    columns["plan"] = 7
     print(" " * 22 + "".join(f"{name:>{width}}" for name, width in columns.items()))
     for scene, truth in accuracy.truths():
         for method in given.methods:
@@ -90,7 +85,7 @@ def main():
             text = f"{row['scene']:<22}{row['error']:>8.2%}{row['true']:>14.2f}"
             text += f"{row['seconds']:>9.1f}{row['longer']:>15.2f}"
             text += f"{row['predicted']:>11.2f}{row['right']:>9.0%}" if row["predicted"] else f"{'-':>11}{'-':>9}"
-            print(text + (f"{row['planned']:>7.2f}" if row["planned"] else f"{'-':>7}"), flush=True)
+            print(text, flush=True)
     known = [row for row in rows if row["predicted"]]
     settings = {"program": program(), **{key: getattr(given, key) for key in ("width", "threads", "seeds", "budgets")}}
     counts = {
@@ -102,17 +97,15 @@ def main():
         "scenes": len(rows),
         "told": len(known),
         "predicted": sum(abs(row["predicted"] - 1) <= WITHIN for row in known),
-        "planned": sum(abs(math.log(row["planned"])) <= math.log(2) for row in rows if row["planned"]),
     }
     print(f"\ntrue within {FACTOR} of it: {counts['true']} of {counts['scenes']}")
     print(f"no more than {LONGER} of the shortest: {counts['longer']} of {counts['scenes']}")
     print(f"predicted within 30 %: {predicted['predicted']} of {predicted['scenes']}")
-    print(f"planned within a factor of 2: {predicted['planned']} of {predicted['scenes']}")
 
     def stored(row, *keys):
         return {"scene": row["scene"], **{key: short(row[key]) for key in keys}}
 
     stops = [stored(row, "error", "true", "seconds", "longer") for row in rows]
     record("target", settings | counts | {"rows": stops})
-    predictions_of = [stored(row, "predicted", "right", "planned") for row in rows]
+    predictions_of = [stored(row, "predicted", "right") for row in rows]
     record("prediction", settings | predicted | {"rows": predictions_of})

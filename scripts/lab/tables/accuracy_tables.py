@@ -25,16 +25,30 @@ def calibration(figures):
 
 
 def target(figures):
-    """Renders with --target-error: their true errors, and their real and predicted times."""
+    """Renders with --target-error: their true errors, and their real times and those predicted meanwhile."""
     stops, predictions = figures.one("target"), {row["scene"]: row for row in figures.one("prediction")["rows"]}
     rows = []
     for row in stops["rows"]:
         known = predictions[row["scene"]]
-        ratios = [row["longer"], known["predicted"], known["planned"]]
+        ratios = [row["longer"], known["predicted"]]
         cells = [row["scene"], f"{100 * row['error']:.1f} %", f"{row['true']:.2f}", f"{row['seconds']:.1f}"]
         rows.append([*cells, *("-" if ratio is None else f"{ratio:.2f}" for ratio in ratios)])
     columns = ["scene", "target", "true over target", "seconds", "over the shortest"]
-    return table([*columns, "progress: predicted over real", "plan: predicted over real"], rows)
+    return table([*columns, "progress: predicted over real"], rows)
 
 
-KINDS = {"calibration": calibration, "target": target}
+def outlook(figures):
+    """Predictions of plan --target-error, and the renders."""
+    rows = []
+    for row in figures.one("outlook")["rows"]:
+        cells = []
+        for predicted, needed in zip(row["predicted"], row["needed"]):
+            ratio = f"{predicted / needed:.2f}" if predicted and row["reached"] else "-"
+            cells += [f"{predicted:.0f}" if predicted else "-", f"{needed:.0f}", ratio]
+        rows.append([row["scene"], *cells])
+    kinds = ("iterations", "core-seconds")
+    columns = [cell for kind in kinds for cell in (f"{kind}, predicted", "needed", "ratio")]
+    return table(["scene", *columns], rows)
+
+
+KINDS = {"calibration": calibration, "target": target, "outlook": outlook}
