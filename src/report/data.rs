@@ -4,9 +4,11 @@ use super::curve::{CurvePoint, FitFailure, Mean, Slope, fireflies};
 use super::entry::PictureSource;
 use super::outcome::Outcome;
 use super::point::Point;
-use super::summary::{Subject, Summary, finite};
+use super::summary::{Seen, Subject, Summary, finite};
 use super::target::Reached;
+use super::verdict::verdict;
 use crate::error::{Error, ErrorKind, Result};
+use crate::image::Comparison;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -108,7 +110,9 @@ pub fn json(subject: &Subject, outcome: &Outcome, summary: &Summary) -> Value {
         },
         "runs": runs.collect::<Vec<_>>(),
         "targets": targets.collect::<Vec<_>>(),
+        "at_equal_time": summary.seen.iter().map(|seen| visible(subject, seen)).collect::<Vec<_>>(),
         "windows": summary.windows,
+        "verdict": verdict(subject, summary),
         "notes": summary.notes,
         "points": outcome.points.iter().map(|point| json!(Row::of(subject, point))).collect::<Vec<_>>(),
     })
@@ -139,6 +143,15 @@ fn run(subject: &Subject, outcome: &Outcome, summary: &Summary, line: usize) -> 
         object["overhead"] = json!(summary.overhead[entry]);
     }
     object
+}
+
+/// The JSON object of the visible errors of a picture.
+fn visible(subject: &Subject, seen: &Seen) -> Value {
+    let Comparison { relmse_trimmed, flip, grain, inside, .. } = seen.errors;
+    json!({
+        "run": subject.lines[seen.line].name, "iterations": seen.iterations, "seconds": seen.seconds,
+        "relmse_trimmed": relmse_trimmed, "flip": flip, "grain": grain, "inside": inside,
+    })
 }
 
 /// The JSON object of facts about another renderer, by its index.

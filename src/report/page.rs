@@ -5,7 +5,8 @@ use super::entry::{Metric, PictureSource};
 use super::number::{plain, short};
 use super::outcome::Outcome;
 use super::summary::{Strip, Subject, Summary};
-use super::tables::{fits, overheads, peers, runs, targets};
+use super::tables::{fits, overheads, peers, runs, seen, targets};
+use super::verdict::verdict;
 use crate::error::Result;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -29,6 +30,7 @@ pub fn html(subject: &Subject, outcome: &Outcome, summary: &Summary, plots: &[Pl
     let bar = data_url(&crop::heat_bar()?);
     let title = format!("Accuracy against time: {}", subject.scene);
     let body = html! {
+        @if let Some(verdict) = verdict(subject, summary) { p.lead { b { (verdict) "." } } }
         @for row in plots.iter().filter(|row| !row.plots.is_empty()) {
             section { h2 { (row.heading) } div.pair {
                 @for (metric, svg) in &row.plots { div.plot { h3 { (meaning(*metric)) } (PreEscaped(svg)) } }
@@ -36,6 +38,7 @@ pub fn html(subject: &Subject, outcome: &Outcome, summary: &Summary, plots: &[Pl
         }
         (marks(subject, summary))
         (targets(subject, summary))
+        (seen(subject, summary))
         (fits(subject, summary))
         (peers(subject, outcome, summary))
         (overheads(subject, summary))

@@ -9,6 +9,8 @@ use super::point::Point;
 use super::subject::{ReportOptions, Subject};
 use crate::error::Result;
 use crate::film::Picture;
+use crate::image::metrics::compare_pictures;
+use crate::image::{Comparison, Floor};
 
 /// Crops of one picture, the same windows of it as of other pictures, with a caption.
 pub struct Crops {
@@ -30,6 +32,26 @@ pub struct Strip {
     pub runs: Vec<Crops>,
     /// The relative error that has the palest colour in the heat maps.
     pub largest: f64,
+}
+
+/// The errors that an eye sees in the picture of a curve at equal time: of the whole picture, and inside glass and mirrors.
+pub struct Seen {
+    /// Index of the curve.
+    pub line: usize,
+    /// Iterations of the picture; samples per pixel for other renderers.
+    pub iterations: u64,
+    /// Wall-clock seconds of the picture.
+    pub seconds: f64,
+    /// The picture against the reference.
+    pub errors: Comparison,
+}
+
+impl Seen {
+    fn of(subject: &Subject, (point, picture): (&Point, &Picture)) -> Result<Seen> {
+        let mut errors = compare_pictures(picture, &subject.reference.picture, Floor::Papers, 0)?;
+        errors.measure_inside(&subject.inside);
+        Ok(Seen { line: point.line, iterations: point.iterations, seconds: point.seconds, errors })
+    }
 }
 
 /// The measurements of the curve with index `line` whose pictures are stored.
@@ -79,6 +101,8 @@ pub(super) struct Gallery {
     pub(super) reference: Crops,
     /// Crops of the curves at equal time and at equal error.
     pub(super) strips: Vec<Strip>,
+    /// The visible errors of the curves at equal time.
+    pub(super) seen: Vec<Seen>,
 }
 
 /// Cuts the crops of the reference and of the curves, in the windows of `options`, or if there are none in those in which
@@ -138,11 +162,12 @@ pub(super) fn gallery(
     }
     let mut parts = vec![Window::whole(reference.picture.size())];
     parts.extend(&windows);
-    let reference = Crops {
+    let whole = Crops {
         name: "reference".into(),
         caption: String::new(),
         pictures: parts.into_iter().map(|part| crop::picture(&reference.picture, part, look)).collect::<Result<_>>()?,
         heat_maps: Vec::new(),
     };
-    Ok(Gallery { windows, reference, strips })
+    let seen = at_time.iter().zip(&timed).map(|shown| Seen::of(subject, shown)).collect::<Result<_>>()?;
+    Ok(Gallery { windows, reference: whole, strips, seen })
 }

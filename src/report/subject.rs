@@ -25,6 +25,8 @@ pub struct Subject {
     pub metric: Metric,
     /// The reference picture, against which errors are measured.
     pub reference: Reference,
+    /// Whether each pixel shows smooth glass or a mirror, in the middle of the pixel.
+    pub inside: Vec<bool>,
     /// Names and values of facts about the machine: processor, threads, versions.
     pub machine: Vec<(String, String)>,
     /// Names and values of options that hold for all runs.

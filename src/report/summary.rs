@@ -13,7 +13,7 @@ use super::theory::{Theory, theory};
 use crate::error;
 use serde_json::Value;
 
-pub use super::strips::{Crops, Strip};
+pub use super::strips::{Crops, Seen, Strip};
 pub use super::subject::{ReportOptions, Subject};
 
 /// Mean of the picture of a peer, another renderer, relative to the reference, which shows whether the scene is the
@@ -69,6 +69,8 @@ pub struct Summary {
     pub reference: Crops,
     /// Crops of the curves' pictures at equal time and at equal error.
     pub strips: Vec<Strip>,
+    /// The visible errors of the curves' pictures at equal time.
+    pub seen: Vec<Seen>,
     /// Remarks about the comparison, in sentences.
     pub notes: Vec<String>,
 }
@@ -107,7 +109,7 @@ pub fn summarize(subject: &Subject, outcome: &mut Outcome, options: &ReportOptio
     }
     let reached = targets.iter().map(|t| curves.iter().map(|c| target::reach(c, t.error)).collect()).collect();
     notes.extend(remarks(*metric, reference, outcome, &curves));
-    let Gallery { windows, reference: whole, strips } = strips::gallery(subject, outcome, options, &curves)?;
+    let Gallery { windows, reference: whole, strips, seen } = strips::gallery(subject, outcome, options, &curves)?;
     Ok(Summary {
         slopes: lines.iter().zip(&curves).map(|(line, curve)| slopes(line.source, curve)).collect(),
         theories: lines.iter().map(|line| theory_of(line.source, entries)).collect(),
@@ -120,6 +122,7 @@ pub fn summarize(subject: &Subject, outcome: &mut Outcome, options: &ReportOptio
         windows,
         reference: whole,
         strips,
+        seen,
         notes,
     })
 }

@@ -141,6 +141,36 @@ pub(super) fn fits(subject: &Subject, summary: &Summary) -> Markup {
     }
 }
 
+/// HTML table of the errors that an eye sees in the pictures at equal time.
+pub(super) fn seen(subject: &Subject, summary: &Summary) -> Markup {
+    if summary.seen.is_empty() {
+        return html! {};
+    }
+    let inside = summary.seen.iter().any(|seen| seen.errors.inside.is_some());
+    html! {
+        section {
+            h2 { "Visible errors at equal time" }
+            div.wide { table {
+                thead { tr { th { "Run" } th.number { "seconds" } th.number { "FLIP" } th.number { "grain" }
+                    @if inside { th.number { "FLIP" br; small { "in glass and mirrors" } }
+                        th.number { "grain" br; small { "in glass and mirrors" } } } } }
+                tbody { @for seen in &summary.seen { tr {
+                    td { (name(subject, seen.line)) }
+                    td.number { (short(seen.seconds)) }
+                    td.number { (short(seen.errors.flip)) }
+                    td.number { (short(seen.errors.grain)) }
+                    @if let Some(inside) = seen.errors.inside {
+                        td.number { (short(inside.flip)) }
+                        td.number { (short(inside.grain)) }
+                    }
+                } } }
+            } }
+            p.note { "FLIP estimates the visible difference from the reference. Grain is the part of relMSE that \
+                neighbouring pixels do not share. Pictures are those of the crops at equal time." }
+        }
+    }
+}
+
 /// HTML table of other renderers: whether the scene is the same, startup times, approximations, and why some are left
 /// out.
 pub(super) fn peers(subject: &Subject, outcome: &Outcome, summary: &Summary) -> Markup {

@@ -111,6 +111,15 @@ fn the_report_of_a_small_comparison() {
     assert_eq!(json["targets"][0]["error"], 1e-9);
     assert_eq!(json["targets"][0]["runs"][1]["because"], "below the reference's error");
     assert_eq!(json["targets"][1]["of"], "one after 10 iterations");
+    let verdict = json["verdict"].as_str().expect("a sentence");
+    assert!(verdict.contains(" reaches an error of ") && verdict.matches(';').count() == 3, "{verdict}");
+    // What the eye sees of each curve; the scene has a glass ball.
+    let seen = json["at_equal_time"].as_array().expect("a list");
+    assert_eq!(seen.len(), 7);
+    for one in seen {
+        let [all, inside] = [&one["grain"], &one["inside"]["grain"]].map(|grain| grain.as_f64().expect("a number"));
+        assert!(all > 0.0 && inside > 0.0 && one["inside"]["pixels"] != 48 * 36, "{one}");
+    }
     assert_eq!(json["runs"][0]["theory"]["exponent"], -1.0);
     let last = &json["runs"][6];
     assert_eq!((&last["name"], &last["theory"]), (&"five, finished".into(), &Value::Null));
@@ -129,6 +138,7 @@ fn the_report_of_a_small_comparison() {
     assert_eq!(page.matches("src=").count(), page.matches("src=\"data:image/png;base64,").count());
     assert!(!page.contains("href") && !page.contains("url(") && !page.contains("@import"));
     assert!(page.contains("&quot;a&lt;b&quot; &amp; 'c'") && !page.contains("a<b"));
+    assert!(page.contains("Visible errors at equal time") && page.contains("in glass and mirrors"));
     for svg in ["out/error-seconds.svg", "out/error-iterations.svg"] {
         let names = elements(&text(&folder, svg));
         assert!(names[0] == "svg" && names.iter().filter(|name| *name == "circle").count() > 20, "{svg}");

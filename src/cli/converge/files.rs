@@ -13,6 +13,7 @@ use caustique::report::equal_time::Outcome;
 use caustique::report::page::Plots;
 use caustique::report::point::Point;
 use caustique::report::summary::{Subject, Summary};
+use caustique::report::verdict::verdict;
 use caustique::report::{data, page, plot};
 use caustique::scene::Scene;
 use serde_json::{Value, json};
@@ -105,6 +106,9 @@ pub fn write(
     bytes("index.html", page::html(subject, outcome, summary, &plots)?.as_bytes())?;
     write_pictures(folder, subject, outcome, (inputs, threads))?;
     if args.progress.for_people() {
+        if let Some(verdict) = verdict(subject, summary) {
+            say(&verdict);
+        }
         say(&format!(
             "{}: the report; points.csv, points.json, plots and pictures are beside it",
             folder.join("index.html").display()
