@@ -47,7 +47,7 @@ const MIN_COSINE: f32 = 1e-30;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eta {
     value: f64,
-    /// Value of a merge relative to an independent sample, see [`Merges`].
+    /// Worth of a merge relative to an independent sample, see [`Merges`].
     worth: Merges,
 }
 
@@ -74,12 +74,13 @@ impl Eta {
         Eta { value: std::f64::consts::PI * f64::from(radius2) * f64::from(light_paths), worth: DVec2::ONE }
     }
 
-    /// Lowers the value of merges: all `photons` that are expected in a merging disc share one camera path and are not
-    /// independent.
+    /// Lowers the worth of merges, which are not independent. What a pixel shows by delta bounces alone merges with photons
+    /// that the `pixels` within the disc share: their noise is one blot, which no mean over neighbours removes. Behind a
+    /// random bounce, all `photons` that are expected in the disc share one camera path.
     #[must_use]
     #[inline]
-    pub fn sharing_camera_path(self, photons: f32) -> Eta {
-        Eta { worth: DVec2::new(1.0, 1.0 / (1.0 + f64::from(photons))), ..self }
+    pub fn sharing(self, pixels: f32, photons: f32) -> Eta {
+        Eta { worth: DVec2::ONE / (1.0 + DVec2::new(f64::from(pixels), f64::from(photons))), ..self }
     }
 }
 

@@ -32,8 +32,8 @@ use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_l
 
 const SIZE: u32 = 16;
 const TOLERANCE: f64 = 1e-4;
-/// The assumed number of photons that share a camera path.
-const SHARING: f32 = 7.0;
+/// The assumed numbers of pixels that share photons, and of photons that share a camera path.
+const SHARING: [f32; 2] = [3.0, 7.0];
 
 /// How a vertex scatters.
 // As in the library, vertices are not boxed.
@@ -304,7 +304,8 @@ impl<'s> Whole<'s> {
                 {
                     return 0.0;
                 }
-                let worth = if self.is_clear(m) { 1.0 } else { 1.0 / (1.0 + f64::from(SHARING)) };
+                let [pixels, photons] = SHARING.map(f64::from);
+                let worth = 1.0 / (1.0 + if self.is_clear(m) { pixels } else { photons });
                 worth * eta * light(m + 1) * eye(m)
             }
             _ => 0.0,
@@ -560,7 +561,7 @@ impl<'a> Lab<'a> {
             only: None,
         };
         let merged = 2.0 * light_paths * samples.merging;
-        let eta = Eta::new(radius * radius, merged).sharing_camera_path(SHARING);
+        let eta = Eta::new(radius * radius, merged).sharing(SHARING[0], SHARING[1]);
         let oracle = std::f64::consts::PI * f64::from(radius * radius) * f64::from(merged);
         // Wider than eta implies, so that many photons are merged. Weights do not depend on distances.
         let levels = MergeLevels::new(std::iter::once((36.0 * radius * radius, eta)));

@@ -72,7 +72,7 @@ pub struct Passes {
     /// Number of the iteration that traced the photons, and their map; `None` before the first one.
     photons: Option<(u64, PhotonMap<MergePhoton>)>,
     recorder: FilmRecorder,
-    /// Number of pixels that the largest initial bandwidth covers: the expected number of photons within it if one light
+    /// Number of pixels that the largest initial bandwidth covers, and expected number of photons within it if one light
     /// path starts per pixel.
     covered: f32,
     /// Initial radii of the largest bandwidth level of all pixels (scene units), apart from the accumulators: every
@@ -205,7 +205,8 @@ impl Passes {
             map,
             merging: settings.counts.merging,
             schedule: settings.schedule(i),
-            expected: self.covered * (self.pairs.len() as f64 * settings.counts.light_paths_per_pixel()) as f32,
+            covered: self.covered,
+            light_paths: (self.pairs.len() as f64 * settings.counts.light_paths_per_pixel()) as f32,
             initial: &self.initial,
         };
         for ((pair, light_paths), samples) in self.pairs.iter().zip(&light).zip(&mut self.samples) {
@@ -255,8 +256,10 @@ struct Iteration<'i, 'a> {
     /// Probability that a camera path merges with photons.
     merging: f32,
     schedule: Schedule,
-    /// Expected number of photons within the largest initial bandwidth.
-    expected: f32,
+    /// Number of pixels within the largest initial bandwidth.
+    covered: f32,
+    /// Light paths per pixel.
+    light_paths: f32,
     /// Initial radii of the largest bandwidth level of all pixels (scene units); empty without merging.
     initial: &'i [f32],
 }
@@ -324,7 +327,8 @@ impl Iteration<'_, '_> {
                 (false, _) => Eta::NONE,
                 (true, true) => {
                     let merges = shared.merged_paths * self.merging;
-                    Eta::new(radius2, merges).sharing_camera_path(self.expected * shrunk)
+                    let pixels = self.covered * shrunk;
+                    Eta::new(radius2, merges).sharing(pixels * self.merging, pixels * self.light_paths)
                 }
                 (true, false) => Eta::MERGE_ONLY,
             };

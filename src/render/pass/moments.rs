@@ -1,8 +1,7 @@
 //! Variances of every choice of numbers of samples, from one proxy render with one sample of each technique
 //! \[Grittmann et al. 2022, "Efficiency-aware multiple importance sampling for bidirectional rendering algorithms"\].
 //!
-//! Let B be the sum over techniques of number of samples times density times worth (1, or 1 / (1 + N) for merges that
-//! share a camera path) of the proxy, and C that of a candidate. A sample of the proxy with the weighted contribution V
+//! Let B be the sum over techniques of number of samples times density times worth (1, or less for merges) of the proxy, and C that of a candidate. A sample of the proxy with the weighted contribution V
 //! and the worth w adds `V^2 B / (C w)` to an estimate of the candidate's second moment, and `V B / C` to the value of
 //! its camera path, whose samples are correlated; see docs/theory.md. B and C are affine in the numbers of light paths,
 //! connections and merges. The coefficients are differences between the weights of the same paths with other numbers of
@@ -77,20 +76,23 @@ impl Densities {
 struct Factors {
     connections: f64,
     light: f64,
-    /// Coefficients of eta for one light path per pixel.
+    /// Number of merges for one light path per pixel.
+    merged: f64,
+    /// Coefficients of eta for one light path per pixel: merges times their worth.
     merges: Merges,
     /// Whether roulette spares camera paths as in path tracing.
     spares: bool,
 }
 
 impl Factors {
-    /// `covered` is the expected number of photons in a merging disc with one light path per pixel.
+    /// `covered` is the number of pixels in a merging disc, and the expected number of photons in it with one light path per
+    /// pixel.
     fn new(counts: Counts, covered: f64) -> Factors {
         let light = counts.light_paths_per_pixel();
         let merged = light * f64::from(counts.merging);
         let connections = if counts.light_paths == 0 { 0.0 } else { f64::from(counts.connections) };
-        let merges = Merges::new(merged, merged / (1.0 + light * covered));
-        Factors { connections, light, merges, spares: counts.leave_camera_paths_alone(counts.merging > 0.0) }
+        let merges = Merges::new(merged / (1.0 + covered), merged / (1.0 + light * covered));
+        Factors { connections, light, merged, merges, spares: counts.leave_camera_paths_alone(counts.merging > 0.0) }
     }
 
     #[inline]
@@ -197,7 +199,7 @@ impl Sums {
     /// Adds the samples of one path, in the order of its vertices.
     #[inline]
     fn add(&mut self, samples: &[Sample], factors: &Factors) {
-        let (c, n) = (factors.connections as f32, factors.merges.x as f32);
+        let (c, n) = (factors.connections as f32, factors.merged as f32);
         // Numbers of pairs of a sample with samples of camera, connections and merges.
         let pairs = [[1.0, c, n], [c, c, c * n], [n, c * n, 0.0]];
         // Sums over the samples so far, times the ratio of their survival.
@@ -230,7 +232,7 @@ impl Sums {
     fn variance(&self, count: f64, factors: &Factors) -> f64 {
         let [camera, connections, merges] = self.values.map(|sum| sum / count as f32);
         let c = factors.connections;
-        let mean = camera + connections * c as f32 + merges * factors.merges.x as f32;
+        let mean = camera + connections * c as f32 + merges * factors.merged as f32;
         self.moment / count - mean_square(mean) + c * (c - 1.0) * mean_square(connections)
     }
 }
@@ -438,7 +440,7 @@ impl Walks<'_, '_> {
 
     fn levels(&self, pixel: usize) -> MergeLevels {
         let radius2 = self.radius2[pixel];
-        let eta = Eta::new(radius2, self.variants[0].merged_paths).sharing_camera_path(self.covered as f32);
+        let eta = Eta::new(radius2, self.variants[0].merged_paths).sharing(self.covered as f32, self.covered as f32);
         MergeLevels::new(std::iter::once((radius2, eta)))
     }
 
@@ -552,7 +554,7 @@ impl Walks<'_, '_> {
             _ if own.y > 0.0 => Correlated::Merges,
             _ => Correlated::None,
         };
-        let worth = if own == Merges::ZERO { 1.0 } else { own.x + own.y / (1.0 + self.covered) };
+        let worth = if own == Merges::ZERO { 1.0 } else { 1.0 / (1.0 + self.covered) };
         let proxy = self.of_proxy.sum(&densities, eta);
         Some(Sample { group, value, eta, proxy, worth, densities, unspared: 1.0, by_camera: 1.0 })
     }

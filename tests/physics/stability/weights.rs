@@ -116,7 +116,7 @@ fn weights_of_any_densities_sum_to_one() {
         let chain = Chain::new(index);
         let eta = match index % 3 {
             0 => Eta::NONE,
-            1 => Eta::new(1e-10, LIGHT_PATHS).sharing_camera_path(7.0),
+            1 => Eta::new(1e-10, LIGHT_PATHS).sharing(3.0, 7.0),
             _ => Eta::new(10.0, LIGHT_PATHS),
         };
         let techniques = if index % 3 == 0 { TechniqueSet::BDPT } else { techniques };
