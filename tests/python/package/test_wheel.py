@@ -33,7 +33,7 @@ class Alone(unittest.TestCase):
 
     def test_its_command_runs_the_program(self):
         for command in ([PYTHON.parent / "caustique"], [PYTHON, "-I", "-m", "caustique"]):
-            done = subprocess.run([*command, "plan", TORUS], capture_output=True, text=True, check=False)
+            done = subprocess.run([*command, "plan", TORUS, "--width", "16"], capture_output=True, text=True, check=False)
             self.assertEqual((done.returncode, done.stdout.splitlines()[0].split(":")[0]), (0, str(TORUS)), done.stderr)
 
     def test_it_renders_far_from_its_sources(self):
