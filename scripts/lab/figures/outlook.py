@@ -33,13 +33,17 @@ def measure(name):
         limit = ["timeout", "--signal=INT", f"{options.seconds}"]
         render = command("render", scene, "-o", picture, *stop, seed=2, progress="none")
         subprocess.run([*limit, *render], stderr=subprocess.DEVNULL)
-        found = read("info", picture)
-    last = found["history"][-1]
+        # A render that is stopped before its first iteration has no picture.
+        found = read("info", picture) if picture.exists() else None
+    needed = [None, None]
+    if found:
+        last = found["history"][-1]
+        needed = [last["iterations"], last["cpu_seconds"] + found["phases"]["layers_and_finish"]]
     return {
         "scene": name,
         "predicted": [outlook.get("iterations"), outlook.get("core_seconds")],
-        "needed": [last["iterations"], last["cpu_seconds"] + found["phases"]["layers_and_finish"]],
-        "reached": found["stopped"] == "error",
+        "needed": needed,
+        "reached": found is not None and found["stopped"] == "error",
     }
 
 
@@ -49,10 +53,10 @@ def main():
     for name in options.scenes:
         row = measure(name)
         rows.append(row)
-        (iterations, seconds), (needed, taken) = row["predicted"], row["needed"]
-        predicted = f"{iterations:>12}{seconds:>14.1f}" if iterations else f"{'-':>12}{'-':>14}"
+        cells = [value for pair in zip(row["predicted"], row["needed"]) for value in pair]
+        text = ("-" if value is None else f"{value:.0f}" for value in cells)
         more = "" if row["reached"] else "  and more"
-        print(f"{name:<10}{predicted[:12]}{needed:>8}{predicted[12:]}{taken:>8.1f}{more}", flush=True)
+        print(f"{name:<10}" + "".join(f"{cell:>{width}}" for cell, width in zip(text, (12, 8, 14, 8))) + more, flush=True)
     known = [row for row in rows if row["predicted"][0] and row["reached"]]
     ratios = [row["predicted"][0] / row["needed"][0] for row in known]
     right = sum(1 / FACTOR <= ratio <= FACTOR for ratio in ratios)

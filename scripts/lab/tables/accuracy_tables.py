@@ -44,7 +44,7 @@ def outlook(figures):
         cells = []
         for predicted, needed in zip(row["predicted"], row["needed"]):
             ratio = f"{predicted / needed:.2f}" if predicted and row["reached"] else "-"
-            cells += [f"{predicted:.0f}" if predicted else "-", f"{needed:.0f}", ratio]
+            cells += ["-" if value is None else f"{value:.0f}" for value in (predicted, needed)] + [ratio]
         rows.append([row["scene"], *cells])
     kinds = ("iterations", "core-seconds")
     columns = [cell for kind in kinds for cell in (f"{kind}, predicted", "needed", "ratio")]
