@@ -14,7 +14,7 @@ use caustique::scene::{Description, Scene};
 use caustique::transport::{InitialMedia, VertexCounts};
 use std::f64::consts::PI;
 use support::scenes::{
-    add, build, camera_paths, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square,
+    add, build, camera_paths, cuboid, glass, lit_room, look_at, matte, mirror, point_light, quad, sphere, square,
 };
 
 /// Variance of one iteration.
@@ -196,4 +196,38 @@ fn merges_match_the_density_of_light_vertices() {
         let edges = 8.0 * 0.04 / (3.0 * PI * 2.0);
         assert!((mean - (1.0 - edges)).abs() < 0.03, "{mean}");
     }
+}
+
+/// Walls seen in a glass ball that fills the picture: neighbouring pixels merge with the same photons, whose noise no mean
+/// over pixels removes. Camera paths and connections find the light, too, with noise of single pixels, so merges weigh
+/// little. Merging alone, the planted fault, has noise whose correlation between neighbours is above the limit. The
+/// correlation of 2 x 24 x 23 products of white noise has a standard error of 0.03.
+#[test]
+fn neighbours_share_little_noise_where_other_techniques_find_the_light() {
+    const SIZE: u32 = 24;
+    const LIMIT: f64 = 0.15;
+    let mut description = lit_room(matte(0.6, 0.0));
+    add(&mut description, "ball", sphere(Vec3::new(0.0, 1.0, 0.0), 0.5, 128), glass(1.5));
+    description.cameras = vec![look_at(DVec3::new(0.0, 1.0, 0.95), DVec3::new(0.0, 1.0, 0.0), 30.0)];
+    let scene = build(description);
+    let camera = scene.camera(&square(SIZE)).expect("a camera");
+    let correlation = |method| {
+        let picture = |seed| {
+            let settings =
+                Settings { method, levels: Levels::new(1), iterations: Some(8), seed, ..Settings::default() };
+            let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
+            rendered.pixels.iter().map(|pixel| pixel.mean(0).x).collect::<Vec<f64>>()
+        };
+        let [one, other] = [1, 2].map(picture);
+        let noise: Vec<f64> = one.iter().zip(&other).map(|(a, b)| a - b).collect();
+        let width = SIZE as usize;
+        let right = (0..noise.len()).filter(|i| i % width + 1 < width).map(|i| noise[i] * noise[i + 1]);
+        let below = (width..noise.len()).map(|i| noise[i] * noise[i - width]);
+        let squares: f64 = noise.iter().map(|value| value * value).sum();
+        let pairs = (2 * width * (width - 1)) as f64;
+        right.chain(below).sum::<f64>() / pairs / (squares / noise.len() as f64)
+    };
+    let [vcm, merging] = [Method::Vcm, Method::Bpm].map(correlation);
+    println!("correlation of neighbours: vcm {vcm:.3}, merging alone {merging:.3}");
+    assert!(vcm < LIMIT && merging > 2.0 * LIMIT, "vcm {vcm}, merging alone {merging}");
 }
