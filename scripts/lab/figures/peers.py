@@ -1,10 +1,10 @@
 """Finished pictures at equal time beside Mitsuba, LuxCore and Cycles with OIDN, in one run, and the pictures of
 docs/gallery.md: ours, the best of each renderer by trimmed relMSE, and the reference.
 
-With several budgets, the pictures are those of the first. The errors inside glass and mirrors at 5, 20 and 60
-core-seconds, also of scenes outside the repository:
+With several budgets, the pictures are those of the first. A figure with a name leaves the gallery's pictures as they are.
+The errors inside glass and mirrors, also of scenes outside the repository:
 
-    scripts/lab.sh peers --scenes second/still,second/vitrine,second/cosmetics,second/bath,PATH.glb --budgets 2.5,10,30
+    scripts/lab.sh peers --name glass --threads 1 --budgets 5,20 --scenes cornell,torus,pool,second/bath,PATH.glb
 
 The budget of other renderers excludes their start-up (reading, compiling kernels, building caches). Ours includes
 everything except reading the scene.
@@ -24,7 +24,7 @@ from ..picture_errors import Reference
 from ..record import ROOT, record
 from . import finished
 
-ARGUMENTS = finished.ARGUMENTS | {"set": "all", "budgets": [6.0], "methods": ["auto"], "clock": "cpu"}
+ARGUMENTS = finished.ARGUMENTS | {"set": "all", "budgets": [6.0], "methods": ["auto"], "clock": "cpu", "name": None}
 GALLERY = ROOT / "docs" / "gallery"
 # The width of a picture in a strip, and the quantile of its brightness that is shown as white.
 SHOWN, WHITE = 240, 0.97
@@ -78,7 +78,8 @@ def compare(scene, names, budget):
         for peer, figures in theirs.items()
     }
     shown, titles = pictures(scene, peers, cell, reference)
-    if budget == options.budgets[0] and cell["core_seconds"].keys() - {"auto"}:  # another renderer has a picture
+    # Another renderer has a picture.
+    if not options.name and budget == options.budgets[0] and cell["core_seconds"].keys() - {"auto"}:
         strip(cell["scene"], shown)
     figures = {"auto": ours, **theirs}
     return {
@@ -118,8 +119,8 @@ def main():
         sys.exit(f"peers: error: {reason}")
     budgets = [measure(names, budget) for budget in options.budgets]
     settings = {"program": program(), **{key: getattr(options, key) for key in ("width", "threads", "clock")}}
-    if options.set == "twins":
-        settings["set"] = "twins"
+    if options.name or options.set == "twins":
+        settings["set"] = options.name or "twins"
     more = {"later_budgets": budgets[1:]} if budgets[1:] else {}
     record("peers", {**settings, "compared": list(COMPARED), "all_figures": FIGURES, **budgets[0], **more})
 

@@ -62,6 +62,21 @@ def peers(figures):
     return table(["caustique over", *(MEASURES[key] for key in values["compared"])], rows)
 
 
+def inside(figures):
+    """FLIP inside glass and mirrors by scene and budget, of caustique and of the best of the other renderers."""
+    values, rows = figures.one("peers"), []
+    by = values["compared"].index("flip_inside")
+    for measured in [values, *values.get("later_budgets", [])]:
+        for row in measured["rows"]:
+            ours = row["figures"]["auto"][by]
+            theirs = {peer: of[by] for peer, of in row["figures"].items() if peer != "auto" and of[by] is not None}
+            if ours is not None and theirs:
+                peer, least = min(theirs.items(), key=lambda item: item[1])
+                shown = [digits(ours), digits(least), NAMES.get(peer, peer), f"{ours / least:.2f}"]
+                rows.append([row["scene"], f"{measured['seconds']:g}", *shown])
+    return table(["scene", "core-s", "caustique", "best other", "renderer", "caustique over it"], rows)
+
+
 def plain(note):
     """A stored note in today's words."""
     for old, new in NOTES.items():
@@ -142,4 +157,4 @@ def gallery(figures):
     return "\n".join(parts)
 
 
-KINDS = {"losses": losses, "peers": peers, "untranslated": untranslated, "gallery": gallery}
+KINDS = {"losses": losses, "peers": peers, "inside": inside, "untranslated": untranslated, "gallery": gallery}
