@@ -43,6 +43,11 @@ pub fn available() -> Option<Available> {
     limits.min_by_key(|limit| limit.bytes)
 }
 
+/// Whether a limit on addresses (`ulimit -v`) counts memory that is reserved and never used.
+pub fn limits_addresses() -> bool {
+    getrlimit(Resource::As).current.is_some()
+}
+
 /// Checks that `bytes` of memory are free. `what` names their users in the message, in the plural: "9 copies".
 ///
 /// # Errors

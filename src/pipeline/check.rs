@@ -52,7 +52,8 @@ pub(super) fn check(request: &Request<'_>, scene: &Scene) -> Result<Checked> {
     layers::check(&request.layers, &shape, finishes, true)?;
     layers::check_names(&request.layers, &shape, finishes, request.naming)?;
     let view = View::new(scene, &checked.camera);
-    let memory = MemoryCheck { view, method: request.picture.method.name(), finishes, limit: request.memory };
+    let (layers, finish) = (&request.layers, request.finish.as_ref().map(|finish| finish.denoiser));
+    let memory = MemoryCheck { view, method: request.picture.method.name(), layers, finish, limit: request.memory };
     memory.fit(checked.settings.clone())?;
     Ok(checked)
 }

@@ -12,8 +12,8 @@ use super::load::Loaded;
 use super::memory::{MemoryCheck, MemoryLimit};
 use super::request::PictureRequest;
 use crate::error::{Error, ErrorKind, Result};
-use crate::film::LayerSet;
-use crate::finish::reads_for_picture;
+use crate::film::{LayerSet, Selection};
+use crate::finish::{DenoiserChoice, reads_for_picture};
 use crate::render::{Candidate, Control, Progress, RenderInput, Session, Settings, StopReason, run_session};
 use crate::scene::View;
 use crate::stop::Stop;
@@ -84,8 +84,9 @@ pub fn render_live(
     }
     let checked = check_picture(&request.picture, request.path, scene)?;
     let view = View::new(scene, &checked.camera);
-    let (name, finishes) = (request.picture.method.name(), finish.is_some());
-    let memory = MemoryCheck { view, method: name, finishes, limit: request.memory };
+    let (name, denoiser) = (request.picture.method.name(), finish.as_ref().map(|_| DenoiserChoice::default()));
+    let memory =
+        MemoryCheck { view, method: name, layers: &Selection::Beauty, finish: denoiser, limit: request.memory };
     let fit = |settings: Settings| {
         let (settings, _) = memory.fit(settings)?;
         Ok(Settings { stop: request.stop.clone(), target_error: None, ..settings })

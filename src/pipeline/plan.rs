@@ -9,6 +9,8 @@ use super::request::{PictureRequest, Request};
 use crate::camera::Camera;
 use crate::choose::{Choice, PilotResult};
 use crate::error::Result;
+use crate::film::Selection;
+use crate::finish::DenoiserChoice;
 use crate::plan::switch::Removed;
 use crate::plan::{self, Plan, Switches};
 use crate::render::Settings;
@@ -72,7 +74,8 @@ pub fn plan_picture(
     let Loaded { scene, removed, .. } = loaded;
     let checked = check_picture(&picture, path, scene)?;
     let view = View::new(scene, &checked.camera);
-    let memory = MemoryCheck { view, method: "auto", finishes: true, limit: None };
+    let finish = Some(DenoiserChoice::default());
+    let memory = MemoryCheck { view, method: "auto", layers: &Selection::All, finish, limit: None };
     let chosen = choose(&mut picture.method, checked.settings, view, memory.admits(), stop);
     let PictureRequest { max_depth, switches, .. } = picture;
     let mut plan = plan(PlanInput { chosen: &chosen, max_depth, switches }, view, removed);
@@ -99,7 +102,8 @@ pub(super) fn plan_render(
     removed: &Removed,
 ) -> Result<Planned> {
     let (method, finishes) = (chosen.settings.method.name(), request.finish.is_some());
-    let memory = MemoryCheck { view, method, finishes, limit: request.memory };
+    let finish = request.finish.as_ref().map(|finish| finish.denoiser);
+    let memory = MemoryCheck { view, method, layers: &request.layers, finish, limit: request.memory };
     let (settings, less_memory) = memory.fit(chosen.settings.clone())?;
     let PictureRequest { max_depth, switches, .. } = request.picture;
     let mut plan = plan(PlanInput { chosen, max_depth, switches }, view, removed);

@@ -31,8 +31,8 @@ fn no_limit_of_memory_aborts_the_program() {
     assert!(codes[0] == Some(1) && codes[codes.len() - 1] == Some(0), "{codes:?}");
 }
 
-/// A render succeeds if its announced memory is available. It takes at most this memory, and at least a third of it, so
-/// that the check does not reject renders that would fit.
+/// A render succeeds if its announced memory is available. It takes at most this memory, and at least two thirds of it,
+/// so that the check does not reject renders that would fit.
 #[test]
 fn renders_whose_announced_memory_fits_succeed() {
     const GIB: f64 = (1 << 30) as f64;
@@ -62,7 +62,7 @@ fn renders_whose_announced_memory_fits_succeed() {
         let (_, header) = folder.read("out.exr");
         assert!(header["combined"]["denoiser"].is_string(), "{method} {size}");
         let used = header["peak_memory"].as_f64().expect("a number");
-        let bound = announced / 3.0..=announced + taken;
+        let bound = announced / 1.5..=announced + taken;
         assert!(bound.contains(&used), "{method} {size}: {used} of {announced}");
     }
 }
