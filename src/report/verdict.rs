@@ -1,4 +1,4 @@
-//! What a comparison says, in one sentence.
+//! The result of a comparison in one sentence.
 
 use super::entry::{Metric, PictureSource};
 use super::number::{plain, short};

@@ -20,8 +20,8 @@ use caustique::render::{Control, Method, Settings};
 use caustique::report::data;
 use caustique::report::entry::{Entry, Metric};
 use caustique::report::equal_time::{Participants, Rules, render_in_turns};
+use caustique::report::inside::shows_glass_or_mirror;
 use caustique::report::reference::{Halves, Reference};
-use caustique::report::seen;
 use caustique::report::summary::{ReportOptions, Subject, summarize};
 use caustique::scene::View;
 use caustique::stat::sum::MAX_TERMS;
@@ -235,7 +235,7 @@ impl Comparison {
             entries,
             rules,
             reference,
-            inside: seen::shows_glass_or_mirror(view),
+            inside: shows_glass_or_mirror(view),
         };
         let look = Look::default();
         let none =

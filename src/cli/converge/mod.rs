@@ -25,7 +25,7 @@ use caustique::render::{Control, Settings};
 use caustique::report::crop::Window;
 use caustique::report::entry::Entry;
 use caustique::report::equal_time::{Participants, Rules, render_in_turns};
-use caustique::report::seen;
+use caustique::report::inside::shows_glass_or_mirror;
 use caustique::report::summary::{ReportOptions, Subject, find, summarize};
 use caustique::scene::View;
 use progress::Reporter;
@@ -95,7 +95,7 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
         scene: args.scene.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
         size: camera.size(),
         machine: machine(threads, &entries),
-        inside: seen::shows_glass_or_mirror(view),
+        inside: shows_glass_or_mirror(view),
         settings: settings(args, &rules),
         metric: args.error_metric,
         lines: outcome.lines.clone(),

@@ -1,11 +1,11 @@
 //! Variances of every choice of numbers of samples, from one proxy render with one sample of each technique
 //! \[Grittmann et al. 2022, "Efficiency-aware multiple importance sampling for bidirectional rendering algorithms"\].
 //!
-//! Let B be the sum over techniques of number of samples times density times worth (1, or less for merges) of the proxy, and C that of a candidate. A sample of the proxy with the weighted contribution V
-//! and the worth w adds `V^2 B / (C w)` to an estimate of the candidate's second moment, and `V B / C` to the value of
-//! its camera path, whose samples are correlated; see docs/theory.md. B and C are affine in the numbers of light paths,
-//! connections and merges. The coefficients are differences between the weights of the same paths with other numbers of
-//! light paths and connections.
+//! Let B be the sum over techniques of number of samples times density times worth (1, or less for merges) of the proxy,
+//! and C that of a candidate. A sample of the proxy with the weighted contribution V and the worth w adds `V^2 B / (C w)`
+//! to an estimate of the candidate's second moment, and `V B / C` to the value of its camera path, whose samples are
+//! correlated; see docs/theory.md. B and C are affine in the numbers of light paths, connections and merges. The
+//! coefficients are differences between the weights of the same paths with other numbers of light paths and connections.
 //!
 //! Camera paths of the proxy have the roulette of path tracing. A candidate whose roulette ends a path more often, by the
 //! ratio R of the probabilities to get as far as a sample, has R times the second moment there. A candidate of camera
