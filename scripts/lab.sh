@@ -23,7 +23,7 @@ setup python
 case $1 in
 compare) "$ROOT/scripts/compare/setup.sh" ;;
 calibration) [ -x "$ROOT/.venv-python/bin/python" ] || setup wheel ;;
-torture | training_data | viewport_latency) setup test ;;
+torture | training_data) setup test ;;
 training) setup train ;;
 esac
 cd "$ROOT"

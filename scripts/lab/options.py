@@ -36,15 +36,12 @@ def budget(text):
 
 
 KNOWN = {
-    "before": Argument(str, "a commit, which is built in the cache, or a program"),
+    "before": Argument(str, "another build of the program"),
     "budgets": Argument(numbers, "seconds of a render; one render for each number"),
     "clock": Argument(str, "wall, or cpu: budgets are core-seconds divided by threads"),
     "denoise": Argument(names, "values of --denoise; one render for each; `default` omits the option"),
     "frames": Argument(int, "frames of each shot, from the first"),
-    "height": Argument(int, "height of the pictures, in pixels"),
     "iterations": Argument(int, "iterations of a render"),
-    "largest": Argument(int, "triangles of the largest scene"),
-    "levels": Argument(str, "bandwidth levels of our renders; `default` uses the default of the method"),
     "methods": Argument(names, "methods to measure"),
     "name": Argument(str, "a name for the stored figure, so that it does not replace the unnamed one"),
     "peers": Argument(names, "other renderers with their modes"),
@@ -53,11 +50,9 @@ KNOWN = {
     "rounds": Argument(int, "number of repetitions; the fastest counts"),
     "scenes": Argument(names, "names below scenes/, such as pool,second/still,twin/pool, or paths that end in .glb"),
     "seconds": Argument(budget, "seconds or core-seconds of a render"),
-    "seed": Argument(int, "seed of random choices"),
     "seeds": Argument(int, "number of renders of each kind, with different seeds"),
     "set": Argument(str, "first, second, all, or twins: scenes without features that other renderers' drivers lack"),
     "shots": Argument(names, "animated shots: pool, turntable, interior, gems"),
-    "spp": Argument(int, "samples per pixel"),
     "target": Argument(float, "relative error that stops a render"),
     "threads": Argument(int, "threads of a render"),
     "width": Argument(int, "width of the pictures, in pixels"),

@@ -16,7 +16,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS = Path(__file__).resolve().parent / "results.jsonl"
 # Values that distinguish figures of one name.
-SUBJECT_KEYS = ("scene", "rule", "parameters", "corrected", "set")
+SUBJECT_KEYS = ("scene", "corrected", "set")
 
 
 def commit():

@@ -231,13 +231,13 @@ class Laboratory(unittest.TestCase):
 
 class Tables(support.Scratch):
     def stored(self, *rows):
-        """Figures from a file with these rows: values, commit, and other keys."""
+        """Figures from a file with these rows of values and commit."""
         machine = {"cpu": "a processor", "cores": 2, "memory_gib": 8.0, "system": "a system"}
         file = self.dir / "results.jsonl"
         with file.open("w", encoding="utf-8") as out:
-            for values, commit, more in rows:
+            for values, commit in rows:
                 row = {"name": "rays", "values": values, "commit": commit, "date": "2026-01-02T03:04:05Z"}
-                out.write(json.dumps({**row, "machine": machine, **more}) + "\n")
+                out.write(json.dumps({**row, "machine": machine}) + "\n")
         return Figures(file=file)
 
     def test_tables_of_the_documents_equal_the_stored_figures(self):
@@ -259,7 +259,7 @@ class Tables(support.Scratch):
                     self.assertNotEqual(changed, block[0])
                     self.assertEqual(tables.filled(changed), block[0])
                 found += 1
-        self.assertGreater(found, 10)
+        self.assertGreater(found, 8)
 
     def test_no_measured_table_is_typed(self):
         for name in ("measurements.md", "accuracy.md", "negative-results.md"):
@@ -273,14 +273,14 @@ class Tables(support.Scratch):
 
     def test_missing_figures_and_unknown_tables_are_named(self):
         for text, said in [
-            ("<!-- table: finished nowhere -->\n<!-- end -->", "'finished'.*'nowhere'"),
+            ("<!-- table: peers nowhere -->\n<!-- end -->", "'peers'.*'nowhere'"),
             ("<!-- table: none -->\n<!-- end -->", "no table 'none'"),
         ]:
             with self.subTest(text), self.assertRaisesRegex(Missing, said):
                 tables.filled(text)
 
     def test_a_source_has_commit_date_and_machine(self):
-        pool, torus = ({"scene": "pool"}, "a" * 40, {}), ({"scene": "torus"}, "b" * 40 + "-dirty", {"carried": True})
+        pool, torus = ({"scene": "pool"}, "a" * 40), ({"scene": "torus"}, "b" * 40)
         figures = self.stored(pool)
         figures.all("rays")
         self.assertEqual(
@@ -291,10 +291,10 @@ class Tables(support.Scratch):
         lines = sorted(figures.source().replace("\n  ", " ").splitlines())
         self.assertEqual(len(lines), 2)
         self.assertRegex(lines[0], r"^- pool: commit a{10}, .* a system\.$")
-        self.assertRegex(lines[1], r"^- torus: commit b{10} with uncommitted changes, .*, copied from printed output")
+        self.assertRegex(lines[1], r"^- torus: commit b{10}, ")
 
     def test_one_figure_is_one(self):
-        figures = self.stored(({"scene": "pool"}, "a" * 40, {}), ({"scene": "torus"}, "a" * 40, {}))
+        figures = self.stored(({"scene": "pool"}, "a" * 40), ({"scene": "torus"}, "a" * 40))
         self.assertEqual(figures.one("rays", scene="pool"), {"scene": "pool"})
         with self.assertRaisesRegex(Missing, "2 figures 'rays'"):
             figures.one("rays")

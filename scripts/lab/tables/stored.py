@@ -20,10 +20,10 @@ class Figures:
         self.rows = [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
         self.used = []
 
-    def all(self, name, having=None, **known):
-        """The values of all figures of a name whose values contain `known` and have the key `having`, sorted by scene."""
+    def all(self, name, **known):
+        """The values of all figures of a name whose values contain `known`, sorted by scene."""
         known["set"] = self.of
-        found = [row for row in self.rows if row["name"] == name and (having is None or having in row["values"])]
+        found = [row for row in self.rows if row["name"] == name]
         found = [row for row in found if all(row["values"].get(key) == value for key, value in known.items())]
         if not found:
             raise Missing(f"no figure {name!r} with {known} is stored")
@@ -51,10 +51,8 @@ class Figures:
 
 def origin(row):
     """Commit, date and machine of a stored figure."""
-    commit, _, dirty = row["commit"].partition("-")
     machine = row["machine"]
     return (
-        f"commit {commit[:10]}{' with uncommitted changes' if dirty else ''}, {row['date'][:10]}, "
+        f"commit {row['commit'][:10]}, {row['date'][:10]}, "
         f"{machine['cores']} cores of {machine['cpu']}, {machine['memory_gib']:g} GiB, {machine['system']}"
-        f"{', copied from printed output' if row.get('carried') else ''}"
     )
