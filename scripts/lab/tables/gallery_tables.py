@@ -7,8 +7,6 @@ from .markdown import digits, table
 
 WIDTH = 120
 
-# The beginning of notes on scenes that a driver cannot translate.
-UNTRANSLATED = "no faithful translation: "
 MEASURES = {
     "relmse": "relMSE, all pixels",
     "relmse_trimmed": "relMSE, trimmed",
@@ -90,7 +88,7 @@ def incomparable(notes):
     found = {}
     for peer, note in notes.items():
         mean = re.fullmatch(r"not comparable: its mean is (\S+) of the reference's.*", note)
-        reason = "not comparable, because the mean is not the reference's" if mean else plain(note)
+        reason = "another mean than the reference's" if mean else plain(note)
         found.setdefault(reason, []).append(NAMES.get(peer, peer) + (f" ({mean[1]})" if mean else ""))
     return found
 
@@ -126,16 +124,6 @@ def _is_translated(row):
     return bool(row["core_seconds"].keys() - {"auto"})
 
 
-def untranslated(figures):
-    """The scenes of which no other renderer has a picture, and why."""
-    values, rows = figures.one("peers"), []
-    for row in values["rows"]:
-        if not _is_translated(row):
-            reasons = dict.fromkeys(note.removeprefix(UNTRANSLATED) for note in row["notes"].values())
-            rows.append([row["scene"], *map(digits, row["figures"]["auto"]), "; ".join(reasons)])
-    return table(["scene", *(f"caustique's {MEASURES[key]}" for key in values["compared"]), "why"], rows)
-
-
 def gallery(figures):
     """A picture, and a table of the best variant of each renderer, for every scene of which another one has a picture."""
     values = figures.one("peers")
@@ -157,4 +145,4 @@ def gallery(figures):
     return "\n".join(parts)
 
 
-KINDS = {"losses": losses, "peers": peers, "inside": inside, "untranslated": untranslated, "gallery": gallery}
+KINDS = {"losses": losses, "peers": peers, "inside": inside, "gallery": gallery}
