@@ -3,7 +3,8 @@
 use super::render::RenderOptions;
 use super::values::{BandwidthChoice, OnOff};
 use crate::error::{Error, Result};
-use crate::render::{BandwidthRule, KernelChoice, Method, RadiusRule, Settings, Shard};
+use crate::photon::Kernel;
+use crate::render::{BandwidthRule, Method, RadiusRule, Settings, Shard};
 use crate::transport::Indirect;
 
 /// Whether an option, given by the name of its field, has an effect with a method.
@@ -69,7 +70,7 @@ impl RenderOptions {
     /// `auto` has chosen.
     pub(super) fn check_method(&self, method: Method, chosen: Option<Method>, rule: RadiusRule) -> Result<()> {
         let local = rule == RadiusRule::Local;
-        if self.kernel.is_some_and(|kernel| kernel != KernelChoice::Box) && (local || !takes("kernel", method)) {
+        if self.kernel.is_some_and(|kernel| kernel != Kernel::Box) && (local || !takes("kernel", method)) {
             let what = if local { "the local rule" } else { method.name() };
             return Err(Error::usage(format!("{what} needs the box kernel"))
                 .hint("leave --kernel out, or choose --method sppm with the memoryless rule, or appm"));

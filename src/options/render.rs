@@ -16,11 +16,11 @@ use crate::estimator::bandwidth::SCREEN_CAP;
 use crate::estimator::rule::chi_squared::ChiSquaredSettings;
 use crate::estimator::rule::volume::ALPHA as VOLUME_ALPHA;
 use crate::finish::{DenoiserChoice, Finish};
+use crate::photon::Kernel;
 use crate::pipeline::{AutoRequest, MethodRequest, PictureRequest, with_light_paths};
 use crate::render::{
-    BandwidthRule, Candidate, Counts, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, KernelChoice,
-    LIGHT_PATH_STEPS, Levels, MAX_CONNECTIONS, MAX_LIGHT_PATHS_PER_PIXEL, Method, PHOTON_BYTES, RadiusRule, Settings,
-    Shard,
+    BandwidthRule, Candidate, Counts, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, LIGHT_PATH_STEPS,
+    Levels, MAX_CONNECTIONS, MAX_LIGHT_PATHS_PER_PIXEL, Method, PHOTON_BYTES, RadiusRule, Settings, Shard,
 };
 use crate::scene::{CameraRequest, MAX_SIZE, Orbit};
 use crate::stat::sum::MAX_TERMS;
@@ -104,7 +104,7 @@ pub struct RenderOptions {
     /// 'gaussian' (cut off at three standard deviations, which are the bandwidth) fall towards the rim. ppm, cppm and
     /// the local rule count photons and need box [default: box]
     #[arg(long, value_enum, help_heading = "Expert")]
-    pub kernel: Option<KernelChoice>,
+    pub kernel: Option<Kernel>,
     /// Guided emission: 'on' starts light paths towards mirrors and glass, from the lights and as often as a short
     /// pilot finds useful. The light is the same, the noise differs. Not for path, pm and --cppm-plus [default: off;
     /// auto: on if mirrors or glass focus light]

@@ -4,64 +4,28 @@
 //! over the squared bandwidth. Values are relative to the box kernel: on surfaces a kernel times 1 / (pi r^2)
 //! integrates to one over the disc of radius r, in media a kernel times 3 / (4 pi r^3) over the ball.
 
+use serde::{Deserialize, Serialize};
 use std::f32::consts::PI;
 use wide::f32x8;
 
-/// A radially symmetric kernel of density estimation. `s` is the squared distance over the squared bandwidth, 0 to 1.
-pub trait Kernel: Copy + Send + Sync + 'static {
-    /// Whether the kernel is constant within the bandwidth, so that a photon has equal weight at all bandwidths that
-    /// contain it.
-    const BOX: bool;
-    /// Second moment of the kernel along an axis over the squared bandwidth; bias is proportional to it.
-    const SECOND_MOMENT: f32;
-    /// Integral of the squared kernel times pi r^2, where r is the bandwidth; variance is proportional to it.
-    const ROUGHNESS: f32;
-    /// Value of the kernel on surfaces over that of the box kernel; `s` is the squared distance over the squared
-    /// bandwidth.
-    fn weight(s: f32) -> f32;
-    /// Value of the kernel in media over that of the box kernel; `s` is the squared distance over the squared
-    /// bandwidth. The shape is that on surfaces, normalised over the ball.
-    fn ball_weight(s: f32) -> f32;
-}
-
-/// The box kernel: constant within the bandwidth, zero outside \[post-reconstruction 2021, (3)\].
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Box;
-
-/// `2 (1 - s)`, and `5/2 (1 - s)` in media: the kernel of least asymptotic error \[Epanechnikov 1969\].
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Epanechnikov;
-
-/// A normal distribution, cut off at three standard deviations (the bandwidth) and normalised.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Gaussian;
-
-impl Kernel for Box {
-    const BOX: bool = true;
-    const SECOND_MOMENT: f32 = 0.25;
-    const ROUGHNESS: f32 = 1.0;
-    #[inline(always)]
-    fn weight(_: f32) -> f32 {
-        1.0
-    }
-    #[inline(always)]
-    fn ball_weight(_: f32) -> f32 {
-        1.0
-    }
-}
-
-impl Kernel for Epanechnikov {
-    const BOX: bool = false;
-    const SECOND_MOMENT: f32 = 1.0 / 6.0;
-    const ROUGHNESS: f32 = 4.0 / 3.0;
-    #[inline(always)]
-    fn weight(s: f32) -> f32 {
-        2.0 * (1.0 - s)
-    }
-    #[inline(always)]
-    fn ball_weight(s: f32) -> f32 {
-        2.5 * (1.0 - s)
-    }
+/// Kernel of photon density estimation: the weight of a photon by its distance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
+pub enum Kernel {
+    /// Constant within the bandwidth
+    ///
+    /// The kernel of \[post-reconstruction 2021, (3)\].
+    #[default]
+    Box,
+    /// Falls with the squared distance
+    ///
+    /// `2 (1 - s)`, and `5/2 (1 - s)` in media: the kernel of least asymptotic error \[Epanechnikov 1969\].
+    Epanechnikov,
+    /// A normal distribution cut off at three standard deviations
+    ///
+    /// They are the bandwidth; the rest is normalised.
+    Gaussian,
 }
 
 /// Half the squared bandwidth over the variance of the Gaussian kernel: the exponent at its rim, three standard
@@ -73,17 +37,45 @@ const KEPT: f32 = 0.988_891;
 /// dx`.
 const BALL_PEAK: f32 = 7.397_645;
 
-impl Kernel for Gaussian {
-    const BOX: bool = false;
-    const SECOND_MOMENT: f32 = 0.5 * (1.0 - (1.0 - KEPT) * (1.0 + RIM)) / (RIM * KEPT);
-    const ROUGHNESS: f32 = 0.5 * RIM * (2.0 - KEPT) / KEPT;
-    #[inline(always)]
-    fn weight(s: f32) -> f32 {
-        (RIM / KEPT) * (-RIM * s).exp()
+impl Kernel {
+    /// Second moment of the kernel along an axis over the squared bandwidth; bias is proportional to it.
+    pub const fn second_moment(self) -> f32 {
+        match self {
+            Kernel::Box => 0.25,
+            Kernel::Epanechnikov => 1.0 / 6.0,
+            Kernel::Gaussian => 0.5 * (1.0 - (1.0 - KEPT) * (1.0 + RIM)) / (RIM * KEPT),
+        }
     }
-    #[inline(always)]
-    fn ball_weight(s: f32) -> f32 {
-        BALL_PEAK * (-RIM * s).exp()
+
+    /// Integral of the squared kernel times pi r^2, where r is the bandwidth; variance is proportional to it.
+    pub const fn roughness(self) -> f32 {
+        match self {
+            Kernel::Box => 1.0,
+            Kernel::Epanechnikov => 4.0 / 3.0,
+            Kernel::Gaussian => 0.5 * RIM * (2.0 - KEPT) / KEPT,
+        }
+    }
+
+    /// Value of the kernel on surfaces over that of the box kernel; `s` is the squared distance over the squared
+    /// bandwidth.
+    #[inline]
+    pub fn weight(self, s: f32) -> f32 {
+        match self {
+            Kernel::Box => 1.0,
+            Kernel::Epanechnikov => 2.0 * (1.0 - s),
+            Kernel::Gaussian => (RIM / KEPT) * (-RIM * s).exp(),
+        }
+    }
+
+    /// Value of the kernel in media over that of the box kernel; `s` is the squared distance over the squared
+    /// bandwidth. The shape is that on surfaces, normalised over the ball.
+    #[inline]
+    pub fn ball_weight(self, s: f32) -> f32 {
+        match self {
+            Kernel::Box => 1.0,
+            Kernel::Epanechnikov => 2.5 * (1.0 - s),
+            Kernel::Gaussian => BALL_PEAK * (-RIM * s).exp(),
+        }
     }
 }
 
@@ -105,26 +97,23 @@ mod tests {
         (0..n).map(|i| f((f64::from(i) + 0.5) / f64::from(n))).sum::<f64>() / f64::from(n)
     }
 
-    fn check<K: Kernel>() {
-        let weight = |s: f64| f64::from(K::weight(s as f32));
-        assert!((integral(weight) - 1.0).abs() < 1e-5);
-        // A round kernel has half of the mean squared distance along each axis.
-        assert!((integral(|s| 0.5 * s * weight(s)) - f64::from(K::SECOND_MOMENT)).abs() < 1e-5);
-        assert!((integral(|s| weight(s) * weight(s)) - f64::from(K::ROUGHNESS)).abs() < 1e-4);
-        assert_eq!(K::BOX, weight(0.0) == weight(0.9));
-        // In a ball the volume element over 4/3 pi r^3 is 3/2 sqrt(s) ds.
-        let over_ball = |w: fn(f32) -> f32| integral(|s| 1.5 * s.sqrt() * f64::from(w(s as f32)));
-        assert!((over_ball(K::ball_weight) - 1.0).abs() < 1e-5);
-        assert!(K::BOX || (over_ball(K::weight) - 1.0).abs() > 0.1, "the disc's normalisation goes unnoticed");
-        let shape = |s: f32| K::ball_weight(s) / K::weight(s);
-        assert!((shape(0.1) - shape(0.7)).abs() < 1e-5);
-    }
-
     #[test]
     fn kernels_are_normalised_and_moments_are_right() {
-        check::<Box>();
-        check::<Epanechnikov>();
-        check::<Gaussian>();
+        for kernel in [Kernel::Box, Kernel::Epanechnikov, Kernel::Gaussian] {
+            let weight = |s: f64| f64::from(kernel.weight(s as f32));
+            assert!((integral(weight) - 1.0).abs() < 1e-5);
+            // A round kernel has half of the mean squared distance along each axis.
+            assert!((integral(|s| 0.5 * s * weight(s)) - f64::from(kernel.second_moment())).abs() < 1e-5);
+            assert!((integral(|s| weight(s) * weight(s)) - f64::from(kernel.roughness())).abs() < 1e-4);
+            assert_eq!(kernel == Kernel::Box, weight(0.0) == weight(0.9));
+            // In a ball the volume element over 4/3 pi r^3 is 3/2 sqrt(s) ds.
+            let over_ball = |w: fn(Kernel, f32) -> f32| integral(|s| 1.5 * s.sqrt() * f64::from(w(kernel, s as f32)));
+            assert!((over_ball(Kernel::ball_weight) - 1.0).abs() < 1e-5);
+            let flat = (over_ball(Kernel::weight) - 1.0).abs();
+            assert!(kernel == Kernel::Box || flat > 0.1, "the disc's normalisation goes unnoticed");
+            let shape = |s: f32| kernel.ball_weight(s) / kernel.weight(s);
+            assert!((shape(0.1) - shape(0.7)).abs() < 1e-5);
+        }
     }
 
     /// The Laplacian is zero for a constant and 4 for x^2 + y^2, at any bandwidth.

@@ -30,9 +30,9 @@ const MAX_BORDERS: u32 = 32;
 
 impl Volume<'_> {
     /// Fraction (0 to 1) of the gathering kernel around `vertex` that is inside the medium, by bandwidth level.
-    pub(super) fn kernel_mass_inside<K: Kernel>(
+    pub(super) fn kernel_mass_inside(
         &self,
-        _: K,
+        kernel: Kernel,
         scene: &Scene,
         vertex: &MediumVertex,
         medium: u32,
@@ -59,7 +59,7 @@ impl Volume<'_> {
             let mut lost = |from: f32, to: f32| {
                 for (mass_inside, &radius2) in mass_inside.iter_mut().zip(radius2) {
                     let radius = radius2.sqrt();
-                    *mass_inside -= (mass::<K>(to / radius) - mass::<K>(from / radius)) / RAYS as f32;
+                    *mass_inside -= (mass(kernel, to / radius) - mass(kernel, from / radius)) / RAYS as f32;
                 }
             };
             for_each_part_outside(scene, ray(k), hit, vertex.arrival.interior, medium, &mut lost);
@@ -151,29 +151,29 @@ const NODES: [(f32, f32); 5] = [
     (0.953_089_9, 0.118_463_44),
 ];
 
-/// Mass of a kernel within the fraction `x` of its radius.
-fn mass<K: Kernel>(x: f32) -> f32 {
+/// Mass of `kernel` within the fraction `x` of its radius.
+fn mass(kernel: Kernel, x: f32) -> f32 {
     if x >= 1.0 {
         return 1.0;
     }
-    let at = |(node, weight): (f32, f32)| weight * (x * node) * (x * node) * K::ball_weight((x * node) * (x * node));
+    let at =
+        |(node, weight): (f32, f32)| weight * (x * node) * (x * node) * kernel.ball_weight((x * node) * (x * node));
     3.0 * x * NODES.into_iter().map(at).sum::<f32>()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::photon::kernel;
 
     /// The mass is `x^3` for the box, `5/2 x^3 - 3/2 x^5` for Epanechnikov's kernel, and 1 over the whole ball.
     #[test]
     fn masses_of_kernels() {
         for k in 0..=20 {
             let x = k as f32 / 20.0 * 0.9999;
-            assert!((mass::<kernel::Box>(x) - x.powi(3)).abs() < 1e-6);
+            assert!((mass(Kernel::Box, x) - x.powi(3)).abs() < 1e-6);
             let expected = 2.5 * x.powi(3) - 1.5 * x.powi(5);
-            assert!((mass::<kernel::Epanechnikov>(x) - expected).abs() < 1e-6);
+            assert!((mass(Kernel::Epanechnikov, x) - expected).abs() < 1e-6);
         }
-        assert!((mass::<kernel::Gaussian>(0.999_99) - 1.0).abs() < 1e-3);
+        assert!((mass(Kernel::Gaussian, 0.999_99) - 1.0).abs() < 1e-3);
     }
 }

@@ -12,12 +12,12 @@ use super::photon_batch::Batch;
 use super::vertex::Vertex;
 use crate::bsdf::LobeSet;
 use crate::math::Rgb;
-use crate::photon::{Kernel, Kind, Near, Photon, PhotonMap};
+use crate::photon::{Kind, Near, Photon, PhotonMap};
 use crate::plan::{Event, LightPrefix, Part};
 use crate::spectrum::Wavelength;
 use std::f32::consts::FRAC_1_PI;
 
-impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, PATHS> {
+impl<B: GatherBandwidths> GatheringWalk<'_, B> {
     /// Adds radiance from the photons around a vertex \[post-reconstruction 2021, (2) and (3)\]: for the lobes in
     /// `broad`, and for those in `onward` where photons share light with the continued path.
     #[inline]
@@ -34,7 +34,7 @@ impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, 
                 continue;
             }
             // Caustics that surfaces scatter again before the camera sees them are indirect light.
-            let caustic = kind == Kind::Caustic && (!PATHS || class.part() == Part::Caustic);
+            let caustic = kind == Kind::Caustic && (!self.paths || class.part() == Part::Caustic);
             self.gather_kind(kind, caustic, vertex, &frame, broad, onward);
         }
     }
@@ -53,7 +53,7 @@ impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, 
         let (p, ng) = (vertex.surface.p, vertex.surface.ng);
         let photons = &self.photons[kind as usize];
         let mut radii = self.bandwidths.radii(kind, photons, p, ng, self.length);
-        if PATHS && self.scattered_broadly {
+        if self.paths && self.scattered_broadly {
             let largest2 = radii.radius2[radii.count.saturating_sub(1)];
             let factor = (radii.indirect_cap2 / largest2).min(1.0);
             radii.radius2.iter_mut().for_each(|radius2| *radius2 *= factor);

@@ -47,9 +47,11 @@ use crate::stop::Stop;
 /// both.
 const MIN_CHANCE: f32 = 0.1;
 
-/// Visitor of a camera path that gathers. `PATHS`: the path continues by broad lobes ([`Indirect::Paths`]).
-pub(super) struct GatheringWalk<'a, B, K, const PATHS: bool> {
-    pub kernel: K,
+/// Visitor of a camera path that gathers.
+pub(super) struct GatheringWalk<'a, B> {
+    pub kernel: Kernel,
+    /// Whether the path continues by broad lobes ([`Indirect::Paths`]).
+    pub paths: bool,
     pub scene: &'a Scene,
     pub photons: &'a PhotonMaps,
     pub near: &'a mut ByKind<Near<Photon>>,
@@ -82,7 +84,7 @@ pub(super) struct GatheringWalk<'a, B, K, const PATHS: bool> {
     pub stop: Option<&'a Stop>,
 }
 
-impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, PATHS> {
+impl<B: GatherBandwidths> GatheringWalk<'_, B> {
     /// Whether the vertex at which the path arrives divides the light among its lobes, for the record.
     #[inline]
     pub(super) fn divides(&self) -> bool {
@@ -129,7 +131,7 @@ impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, 
         (scattered, seen): (Option<Scattered>, FirstScatter),
         density: impl FnOnce() -> Option<EmissionDensity>,
     ) {
-        if PATHS && self.scattered_broadly && scattered.is_some_and(|s| !s.lobe.intersects(LobeSet::BROAD)) {
+        if self.paths && self.scattered_broadly && scattered.is_some_and(|s| !s.lobe.intersects(LobeSet::BROAD)) {
             // A caustic: photons find it.
             return;
         }
@@ -253,7 +255,7 @@ impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, 
     }
 }
 
-impl<'a, B: GatherBandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for GatheringWalk<'_, B, K, PATHS> {
+impl<'a, B: GatherBandwidths> Visitor<'a> for GatheringWalk<'_, B> {
     const BRANCHES: bool = true;
     const SPLITS: bool = true;
 
@@ -313,7 +315,7 @@ impl<'a, B: GatherBandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gath
         self.glints.arrive();
         let broad = lobes & LobeSet::BROAD;
         let onward = lobes & (LobeSet::SHARP | LobeSet::DELTA);
-        if PATHS {
+        if self.paths {
             return self.sample_and_continue(vertex, broad, onward);
         }
         if vertex.depth < self.max_depth {
@@ -448,7 +450,7 @@ impl<'a, B: GatherBandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gath
     }
 }
 
-impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, PATHS> {
+impl<B: GatherBandwidths> GatheringWalk<'_, B> {
     /// Radiance by bandwidth level from the photons around a vertex in a medium; zero if the picture does not show
     /// their class.
     #[inline]
@@ -475,33 +477,18 @@ impl CameraPaths<'_> {
     /// Traces one camera path and samples its light at all bandwidth levels of `bandwidths`, and of `volume` where
     /// media scatter, with `kernel`. `scratch` must not have served photons of another iteration.
     #[inline]
-    pub fn sample(
-        &self,
-        scratch: &mut Scratch,
-        start: &CameraPathStart,
-        photons: &PhotonMaps,
-        volume: Option<Volume<'_>>,
-        bandwidths: &mut impl GatherBandwidths,
-        kernel: impl Kernel,
-    ) -> PixelSample {
-        match self.indirect {
-            Indirect::Photons => self.sample_with::<_, _, false>(scratch, start, photons, volume, bandwidths, kernel),
-            Indirect::Paths => self.sample_with::<_, _, true>(scratch, start, photons, volume, bandwidths, kernel),
-        }
-    }
-
-    #[inline]
-    fn sample_with<B: GatherBandwidths, K: Kernel, const PATHS: bool>(
+    pub fn sample<B: GatherBandwidths>(
         &self,
         scratch: &mut Scratch,
         (start, stream): &CameraPathStart,
         photons: &PhotonMaps,
         volume: Option<Volume<'_>>,
         bandwidths: &mut B,
-        kernel: K,
+        kernel: Kernel,
     ) -> PixelSample {
-        let mut visitor = GatheringWalk::<B, K, PATHS> {
+        let mut visitor = GatheringWalk {
             kernel,
+            paths: self.indirect == Indirect::Paths,
             scene: self.scene,
             photons,
             near: &mut scratch.near,

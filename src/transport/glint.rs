@@ -72,15 +72,15 @@ impl Glints {
     /// Starts to gather photons of `map` at the sharp lobes of this vertex. The path continues by `onward`, its sharp and
     /// delta lobes.
     #[inline]
-    pub fn gather<'s, K: Kernel>(
+    pub fn gather<'s>(
         &mut self,
-        _: K,
+        kernel: Kernel,
         shading: &'s Shading<'s>,
         ng: Vec3,
         onward: Onward,
         radii: &LevelRadii,
         map: &PhotonMap,
-    ) -> GlintGather<'s, K> {
+    ) -> GlintGather<'s> {
         let paths = map.paths() as f32;
         let count = if map.paths() == 0 { 0 } else { radii.count };
         let radius2 = radii.radius2.map(|radius2| AREA_RATIO * radius2);
@@ -88,7 +88,7 @@ impl Glints {
         self.here = MergeAreas { areas, order: radii.order, count, going: onward.probability };
         let reach2 = count.checked_sub(1).map_or(0.0, |last| radius2[last]);
         GlintGather {
-            kernel: std::marker::PhantomData,
+            kernel,
             shading,
             ng,
             onward,
@@ -131,8 +131,8 @@ impl Glints {
 }
 
 /// Sums of the photons gathered at the sharp lobes of one vertex.
-pub(super) struct GlintGather<'s, K> {
-    kernel: std::marker::PhantomData<K>,
+pub(super) struct GlintGather<'s> {
+    kernel: Kernel,
     shading: &'s Shading<'s>,
     ng: Vec3,
     onward: Onward,
@@ -149,7 +149,7 @@ pub(super) struct GlintGather<'s, K> {
     transmitted: Rgb,
 }
 
-impl<K: Kernel> GlintGather<'_, K> {
+impl GlintGather<'_> {
     /// Divides the light of the radius number `index` into reflected and transmitted light.
     #[inline]
     pub fn divide(&mut self, index: Option<usize>) {
@@ -196,7 +196,7 @@ impl<K: Kernel> GlintGather<'_, K> {
         let light = photon.flux * f / cosine;
         for (sum, radius2) in self.sums.iter_mut().zip(self.radius2) {
             if distance2 < radius2 {
-                let kernel = if K::BOX { 1.0 } else { K::weight(distance2 / radius2) };
+                let kernel = self.kernel.weight(distance2 / radius2);
                 // The weight over pi r^2; bounded however small the kernel is.
                 *sum += light * (kernel / (area_per_photon + PI * radius2));
             }
@@ -205,7 +205,7 @@ impl<K: Kernel> GlintGather<'_, K> {
             && distance2 < radius2
             && shading.transmits_to(photon.wi)
         {
-            let kernel = if K::BOX { 1.0 } else { K::weight(distance2 / radius2) };
+            let kernel = self.kernel.weight(distance2 / radius2);
             self.transmitted += light * (kernel / (area_per_photon + PI * radius2));
         }
         light * (self.largest / (area_per_photon + self.largest))
@@ -223,7 +223,6 @@ mod tests {
     use super::*;
     use crate::bsdf::{Bsdf, EnergyTables, Interface, Parameters};
     use crate::math::Frame;
-    use crate::photon::kernel;
     use crate::random::{Domain, Purpose, Stream};
 
     const LEVELS: [f32; 3] = [1e-4, 4e-3, 0.2];
@@ -279,7 +278,7 @@ mod tests {
                 let mut glints = Glints::NONE;
                 let map = PhotonMap::build(vec![photon]).of_paths(PATHS);
                 let radii = LevelRadii::new(LEVELS.into_iter());
-                let mut merging = glints.gather(kernel::Box, &shading, Vec3::Z, onward, &radii, &map);
+                let mut merging = glints.gather(Kernel::Box, &shading, Vec3::Z, onward, &radii, &map);
                 merging.push(&photon, 0.0);
                 let merged = merging.finish();
                 let found = sample.wi.z.abs().recip() * shading.eval_cos(sample.wi, Transport::Radiance, lobes);
@@ -317,7 +316,7 @@ mod tests {
         {
             let map = PhotonMap::build(vec![photon]).of_paths(paths);
             let radii = LevelRadii::new(LEVELS.into_iter());
-            let mut merging = glints.gather(kernel::Box, &shading, Vec3::Z, sharp, &radii, &map);
+            let mut merging = glints.gather(Kernel::Box, &shading, Vec3::Z, sharp, &radii, &map);
             merging.push(&photon, 0.0);
             assert_eq!(merging.finish()[0].x > 0.0, merges);
         }

@@ -5,8 +5,8 @@ use crate::math::Rgb;
 use crate::photon::{Kernel, Photon, PhotonFlags};
 
 /// Sums over photons of the light that diffuse and transmitting lobes scatter, at one bandwidth.
-pub(super) struct LobeGather<'a, K> {
-    kernel: std::marker::PhantomData<K>,
+pub(super) struct LobeGather<'a> {
+    kernel: Kernel,
     shading: &'a Shading<'a>,
     /// Squared radius of the kernel (square scene units).
     radius2: f32,
@@ -16,9 +16,8 @@ pub(super) struct LobeGather<'a, K> {
     transmitted: Rgb,
 }
 
-impl<'a, K: Kernel> LobeGather<'a, K> {
-    pub fn new(_: K, shading: &'a Shading<'a>, radius2: f32, sets: [LobeSet; 2]) -> LobeGather<'a, K> {
-        let kernel = std::marker::PhantomData;
+impl<'a> LobeGather<'a> {
+    pub fn new(kernel: Kernel, shading: &'a Shading<'a>, radius2: f32, sets: [LobeSet; 2]) -> LobeGather<'a> {
         LobeGather { kernel, shading, radius2, sets, diffuse: Rgb::ZERO, transmitted: Rgb::ZERO }
     }
 
@@ -33,8 +32,7 @@ impl<'a, K: Kernel> LobeGather<'a, K> {
         if value == Rgb::ZERO {
             return;
         }
-        let kernel = if K::BOX { 1.0 } else { K::weight(distance2 / self.radius2) };
-        let light = value * photon.flux * kernel;
+        let light = value * photon.flux * self.kernel.weight(distance2 / self.radius2);
         let whole = self.shading.eval_cos(photon.wi, Transport::Radiance, set);
         let [diffuse, _, transmitted] = self.shading.lobe_shares(photon.wi, Transport::Radiance, set, whole);
         self.diffuse += light * diffuse;

@@ -62,8 +62,8 @@ fn dot(a: &[f32x8; 3], b: &[f32x8; 3]) -> f32x8 {
 }
 
 /// Photons of one kind that wait for their BSDF at a vertex, and the sums of the evaluated ones.
-pub(super) struct Batch<'a, 's, K> {
-    kernel: std::marker::PhantomData<K>,
+pub(super) struct Batch<'a, 's> {
+    kernel: Kernel,
     radii: &'s [f32],
     p: Vec3,
     throughput: Rgb,
@@ -75,21 +75,21 @@ pub(super) struct Batch<'a, 's, K> {
     sums: [[f32x8; 3]; MAX_LEVELS],
 }
 
-impl<'a, 's, K: Kernel> Batch<'a, 's, K> {
+impl<'a, 's> Batch<'a, 's> {
     /// `radii` are squared and ascending. Photons are evaluated with the lobes of `set`, those that no continued path
     /// could find with the lobes of `all`.
     #[inline]
     pub fn new(
-        _: K,
+        kernel: Kernel,
         radii: &'s [f32],
         waiting: &'s mut Waiting,
         vertex: &Vertex<'a, '_>,
         set: LobeSet,
         all: LobeSet,
-    ) -> Batch<'a, 's, K> {
+    ) -> Batch<'a, 's> {
         let shading = vertex.shading;
         Batch {
-            kernel: std::marker::PhantomData,
+            kernel,
             radii,
             p: vertex.surface.p,
             throughput: vertex.throughput,
@@ -165,16 +165,19 @@ impl<'a, 's, K: Kernel> Batch<'a, 's, K> {
     #[inline(always)]
     fn add<C: PhotonCounter>(&mut self, light: &[f32x8; 3], distance2: f32x8) {
         // With one level, each photon within reach is within its radius.
-        if K::BOX && !C::BEYOND && self.radii.len() == 1 {
+        if self.kernel == Kernel::Box && !C::BEYOND && self.radii.len() == 1 {
             self.sums[0].iter_mut().zip(light).for_each(|(sum, light)| *sum += *light);
             return;
         }
         for (sums, &radius2) in self.sums.iter_mut().zip(self.radii) {
             let within = distance2.cmp_lt(f32x8::splat(radius2));
-            let weight = if K::BOX { f32x8::ONE } else { f32x8::from((distance2 / radius2).to_array().map(K::weight)) };
+            let weight = match self.kernel {
+                Kernel::Box => f32x8::ONE,
+                kernel => f32x8::from((distance2 / radius2).to_array().map(|s| kernel.weight(s))),
+            };
             for (sum, light) in sums.iter_mut().zip(light) {
                 // Unused lanes are infinitely far away, where the product is NaN, so the mask comes last.
-                *sum += within & if K::BOX { *light } else { *light * weight };
+                *sum += within & (*light * weight);
             }
         }
     }

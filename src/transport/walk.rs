@@ -351,7 +351,7 @@ impl<'a> Path<'a> {
     ) -> Option<()> {
         self.throughput *= arrival.transmittance;
         if V::BRANCHES && BESIDES >= DISPERSION && self.takes_wavelengths(&arrival) {
-            self.split_wavelengths::<V, BESIDES>(&arrival, flight, visitor);
+            self.split_wavelengths(&arrival, flight, visitor);
             return None;
         }
         self.scatter::<V, BESIDES>(&arrival, flight, visitor)
@@ -512,12 +512,7 @@ impl<'a> Path<'a> {
 
     /// Follows one branch of the path for each of several wavelengths.
     #[inline(never)]
-    fn split_wavelengths<V: Visitor<'a>, const BESIDES: u8>(
-        &mut self,
-        arrival: &Arrival,
-        flight: FlightDensity,
-        visitor: &mut V,
-    ) {
+    fn split_wavelengths<V: Visitor<'a>>(&mut self, arrival: &Arrival, flight: FlightDensity, visitor: &mut V) {
         for (k, wavelength) in self.wavelength_sample.spread().enumerate() {
             let mut branch = *self;
             if k > 0 {
@@ -527,9 +522,9 @@ impl<'a> Path<'a> {
             branch.throughput *= wavelength.weight;
             branch.wavelength = Some(wavelength);
             visitor.branch(|visitor| {
-                if branch.scatter::<V, BESIDES>(arrival, flight, visitor).is_some() {
+                if branch.scatter::<V, DISPERSION>(arrival, flight, visitor).is_some() {
                     branch.depth += 1;
-                    branch.follow_branch::<V, BESIDES>(&PrecomputedHit::Unknown, visitor);
+                    branch.follow_branch::<V, DISPERSION>(&PrecomputedHit::Unknown, visitor);
                 } else {
                     visitor.end(branch.share);
                 }

@@ -10,8 +10,9 @@ use caustique::estimator::InitialBandwidth;
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec2, Vec3};
 use caustique::medium::HenyeyGreenstein;
+use caustique::photon::Kernel;
 use caustique::random::{Domain, Purpose, Stream};
-use caustique::render::{KernelChoice, Levels, Method, Settings};
+use caustique::render::{Levels, Method, Settings};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
 use support::channels::{self, SIZE, agree};
@@ -371,7 +372,7 @@ fn kernels_at_boundaries_are_compensated() {
         let scene = build(description);
         let expected = sigma.map(|sigma| single_scattered_share(&scene, 12, sigma, half));
         let check = ByChannel { expected, bias: 0.02, detects: 0.09 };
-        for kernel in [KernelChoice::Box, KernelChoice::Gaussian] {
+        for kernel in [Kernel::Box, Kernel::Gaussian] {
             let mut values: [Vec<f64>; 3] = Default::default();
             for seed in 0..8 {
                 let one = Settings { kernel, levels: Levels::new(1), ..photons(10_000, 0.6, 6, seed) };

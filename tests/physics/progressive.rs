@@ -9,9 +9,9 @@ use caustique::estimator::InitialBandwidth;
 use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
 use caustique::estimator::rule::memoryless::radius2_factor;
 use caustique::math::{DVec3, Vec3};
-use caustique::photon::Kind;
+use caustique::photon::{Kernel, Kind};
 use caustique::random::{Domain, QUARTERS, quarter};
-use caustique::render::{Control, KernelChoice, Levels, Method, RadiusRule, Rendered, Settings, render};
+use caustique::render::{Control, Levels, Method, RadiusRule, Rendered, Settings, render};
 use caustique::scene::description::PunctualLight;
 use caustique::scene::{Description, Scene};
 use caustique::transport::{EqualFlux, InitialMedia, LightPaths, Photons};
@@ -29,12 +29,12 @@ fn variants() -> Vec<(&'static str, Settings)> {
     let plus = ChiSquaredSettings { plus: true, ..ChiSquaredSettings::default() };
     vec![
         ("sppm", base(Method::Sppm)),
-        ("sppm, epanechnikov", kernel(Method::Sppm, KernelChoice::Epanechnikov)),
-        ("sppm, gaussian", kernel(Method::Sppm, KernelChoice::Gaussian)),
+        ("sppm, epanechnikov", kernel(Method::Sppm, Kernel::Epanechnikov)),
+        ("sppm, gaussian", kernel(Method::Sppm, Kernel::Gaussian)),
         ("sppm, local", Settings { radius_rule: RadiusRule::Local, ..base(Method::Sppm) }),
         ("ppm", base(Method::Ppm)),
         ("appm", base(Method::Appm)),
-        ("appm, epanechnikov", kernel(Method::Appm, KernelChoice::Epanechnikov)),
+        ("appm, epanechnikov", kernel(Method::Appm, Kernel::Epanechnikov)),
         ("cppm", base(Method::Cppm)),
         ("cppm+", Settings { chi_squared: plus, ..base(Method::Cppm) }),
     ]

@@ -23,7 +23,6 @@ use crate::photon::{Kernel, kernel::laplacian};
 use crate::transport::FoundPhotons;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
-use std::marker::PhantomData;
 use wide::{CmpLt, f32x8};
 
 /// Initial squared radius of the kernel that estimates the Laplacian, over the squared radius of the picture level (the
@@ -35,9 +34,12 @@ const BOUNDS: (f64, f64) = (1.0 / 64.0, 4.0);
 /// Smallest number of photons from which bandwidths are estimated.
 const MIN_PHOTONS: u32 = 10;
 
-/// The adaptive bandwidth rule of Kaplanyan and Dachsbacher 2013 for gathering with the kernel `K`.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Adaptive<K>(PhantomData<K>);
+/// The adaptive bandwidth rule of Kaplanyan and Dachsbacher 2013.
+#[derive(Clone, Copy, Debug)]
+pub struct Adaptive {
+    /// The kernel that gathers.
+    pub kernel: Kernel,
+}
 
 /// Bandwidth of one level of one pixel, with the sums that determine it. The sums of the largest level of a camera path
 /// determine all levels, which keep their ratio.
@@ -74,7 +76,7 @@ pub struct Tally {
     noise: f64,
 }
 
-impl<K: Kernel> CountingRule for Adaptive<K> {
+impl CountingRule for Adaptive {
     type Bandwidth = Bandwidth;
     type Count = ();
     type Tally = Tally;
@@ -124,7 +126,7 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
         let n = i as f64;
         let memoryless2 = picture2 * radius2_factor(next, 2.0 / 3.0);
         let squared = (last.laplacian * last.laplacian - last.noise).max(0.0) / (n * n);
-        let optimum = optimum2::<K>(last.shot / n, squared, n);
+        let optimum = optimum2(self.kernel, last.shot / n, squared, n);
         let known = last.photons >= MIN_PHOTONS && !optimum.is_nan();
         let picture2 = if known { optimum } else { memoryless2 };
         let picture2 = picture2.clamp(BOUNDS.0 * memoryless2, BOUNDS.1 * memoryless2) as f32;
@@ -136,9 +138,9 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
 
 /// Squared radius of least error after `n` iterations; `shot` is the density q of squared contributions, `squared` the
 /// squared Laplacian D^2. NaN if nothing is known.
-fn optimum2<K: Kernel>(shot: f64, squared: f64, n: f64) -> f64 {
-    let bias2 = f64::from(K::SECOND_MOMENT).powi(2) * squared;
-    (2.0 * shot * f64::from(K::ROUGHNESS) / (3.0 * PI * n * bias2)).cbrt()
+fn optimum2(kernel: Kernel, shot: f64, squared: f64, n: f64) -> f64 {
+    let bias2 = f64::from(kernel.second_moment()).powi(2) * squared;
+    (2.0 * shot * f64::from(kernel.roughness()) / (3.0 * PI * n * bias2)).cbrt()
 }
 
 #[cfg(test)]
@@ -146,28 +148,25 @@ mod tests {
     use super::*;
     use crate::math::Vec3;
     use crate::photon::ThinningKey;
-    use crate::photon::kernel::{Box, Epanechnikov};
     use crate::random::{Domain, Purpose, Stream};
 
     /// The closed form against a search over constants c of radii `c i^(-1/6)`.
     #[test]
     fn the_optimum_has_the_least_error() {
-        fn check<K: Kernel>() {
+        for kernel in [Kernel::Box, Kernel::Epanechnikov] {
             let (q, d, n) = (3.0, 20.0, 4096.0);
             let error = |last2: f64| {
                 let radii = (1..=n as u64).map(|i| last2 * (n / i as f64).cbrt());
                 let (mut variance, mut bias) = (0.0, 0.0);
                 for r2 in radii {
-                    variance += q * f64::from(K::ROUGHNESS) / (PI * r2) / (n * n);
-                    bias += 0.5 * f64::from(K::SECOND_MOMENT) * d * r2 / n;
+                    variance += q * f64::from(kernel.roughness()) / (PI * r2) / (n * n);
+                    bias += 0.5 * f64::from(kernel.second_moment()) * d * r2 / n;
                 }
                 variance + bias * bias
             };
-            let best = optimum2::<K>(q, d * d, n);
+            let best = optimum2(kernel, q, d * d, n);
             assert!(error(best) < error(best * 1.05) && error(best) < error(best * 0.95));
         }
-        check::<Box>();
-        check::<Epanechnikov>();
     }
 
     /// Photons of density 30,000 (1 + d / 4 (x^2 + y^2)), whose Laplacian is 30,000 d. Estimates are unbiased within
@@ -175,7 +174,7 @@ mod tests {
     #[test]
     fn curvature_is_estimated_and_shrinks_bandwidths() {
         let run = |d: f64| {
-            let rule = Adaptive::<Box>::default();
+            let rule = Adaptive { kernel: Kernel::Box };
             let mut bandwidth = rule.initial(0.01, 10.0, 0);
             for i in 1..=400u64 {
                 let mut tally = Tally::default();

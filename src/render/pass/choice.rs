@@ -13,9 +13,9 @@ use crate::estimator::rule::adaptive::Adaptive;
 use crate::estimator::rule::chi_squared::ChiSquared;
 use crate::estimator::rule::local::LocalStatistics;
 use crate::estimator::rule::thinned::Thinned;
-use crate::photon::{Kernel, kernel};
+use crate::photon::Kernel;
 use crate::render::input::RenderInput;
-use crate::render::settings::{BandwidthRule, KernelChoice, Method};
+use crate::render::settings::{BandwidthRule, Method};
 use crate::transport::TechniqueSet;
 
 /// Makes the integrator of the settings' method, before the first iteration.
@@ -40,40 +40,20 @@ fn sppm<'a>(input: &'a RenderInput<'a>, tracer: PhotonTracer) -> Box<dyn Integra
     match settings.bandwidth_rule() {
         // Photons of equal flux need no thinning: they are as dense as the light.
         Some(Rule::ChiSquared) if tracer.guide().is_some() && !settings.has_channels() => {
-            counted(input, tracer, Thinned::new(&settings.chi_squared), kernel::Box)
+            counted(input, tracer, Thinned::new(&settings.chi_squared), Kernel::Box)
         }
-        Some(Rule::ChiSquared) => counted(input, tracer, ChiSquared::new(&settings.chi_squared), kernel::Box),
-        Some(Rule::Adaptive) => match settings.kernel {
-            KernelChoice::Box => adaptive(input, tracer, kernel::Box),
-            KernelChoice::Epanechnikov => adaptive(input, tracer, kernel::Epanechnikov),
-            KernelChoice::Gaussian => adaptive(input, tracer, kernel::Gaussian),
-        },
-        Some(Rule::Local) => counted(input, tracer, LocalStatistics { alpha: settings.alpha }, kernel::Box),
-        Some(Rule::Memoryless) | None => match settings.kernel {
-            KernelChoice::Box => memoryless(input, tracer, kernel::Box),
-            KernelChoice::Epanechnikov => memoryless(input, tracer, kernel::Epanechnikov),
-            KernelChoice::Gaussian => memoryless(input, tracer, kernel::Gaussian),
-        },
+        Some(Rule::ChiSquared) => counted(input, tracer, ChiSquared::new(&settings.chi_squared), Kernel::Box),
+        Some(Rule::Adaptive) => counted(input, tracer, Adaptive { kernel: settings.kernel }, settings.kernel),
+        Some(Rule::Local) => counted(input, tracer, LocalStatistics { alpha: settings.alpha }, Kernel::Box),
+        Some(Rule::Memoryless) | None => Box::new(Sppm::new(input, tracer, Scheduled::new(settings), settings.kernel)),
     }
-}
-
-fn memoryless<'a>(input: &'a RenderInput<'a>, tracer: PhotonTracer, kernel: impl Kernel) -> Box<dyn Integrator + 'a> {
-    Box::new(Sppm::new(input, tracer, Scheduled::new(&input.settings), kernel))
-}
-
-fn adaptive<'a, K: Kernel + Default>(
-    input: &'a RenderInput<'a>,
-    tracer: PhotonTracer,
-    kernel: K,
-) -> Box<dyn Integrator + 'a> {
-    counted(input, tracer, Adaptive::<K>::default(), kernel)
 }
 
 fn counted<'a>(
     input: &'a RenderInput<'a>,
     tracer: PhotonTracer,
     rule: impl CountingRule + 'a,
-    kernel: impl Kernel,
+    kernel: Kernel,
 ) -> Box<dyn Integrator + 'a> {
     let RenderInput { scene, settings, .. } = input;
     let kinds = settings.bandwidth_kinds(&scene.survey);

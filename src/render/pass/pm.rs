@@ -18,7 +18,7 @@ use crate::camera::{Camera, par_pixels, pixels_per_band};
 use crate::estimator::bandwidth::{MIN_RADIUS_RATIO, SCREEN_CAP, picture_width_at};
 use crate::estimator::{InitialBandwidth, PixelAccumulator};
 use crate::math::Vec3;
-use crate::photon::{ByKind, Kind, MAX_NEIGHBOURS, Nearest, Photon, PhotonMap, PhotonMaps, kernel, kind};
+use crate::photon::{ByKind, Kernel, Kind, MAX_NEIGHBOURS, Nearest, Photon, PhotonMap, PhotonMaps, kind};
 use crate::random::{Domain, Streams};
 use crate::render::clock::Phases;
 use crate::render::clock::cpu_seconds;
@@ -179,7 +179,7 @@ impl Integrator for Pm {
                 for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
                     let mut neighbours = Neighbours { count, nearest: &mut *nearest, camera, least };
                     scratch.lobes.start(Some(0));
-                    let sample = camera_paths.sample(scratch, start, &maps, None, &mut neighbours, kernel::Box);
+                    let sample = camera_paths.sample(scratch, start, &maps, None, &mut neighbours, Kernel::Box);
                     samples.set(place.at, &sample);
                     samples.set_lobes(place.at, &scratch.lobes.all());
                 }

@@ -22,17 +22,17 @@ use crate::transport::{CameraPathStart, LobeLight, PixelSample, Scratch};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Integrator of progressive photon mapping with the bandwidth rule `B` and the kernel `K`.
-pub(super) struct Sppm<B, K> {
+/// Integrator of progressive photon mapping with the bandwidth rule `B`.
+pub(super) struct Sppm<B> {
     tracer: PhotonTracer,
     bandwidths: B,
-    kernel: K,
+    kernel: Kernel,
     /// Samples of all pixels in the current iteration, for each of a pixel's camera paths.
     samples: Vec<SampleBuffer>,
 }
 
-impl<B: PixelBandwidths, K: Kernel> Sppm<B, K> {
-    pub fn new(input: &RenderInput<'_>, tracer: PhotonTracer, bandwidths: B, kernel: K) -> Sppm<B, K> {
+impl<B: PixelBandwidths> Sppm<B> {
+    pub fn new(input: &RenderInput<'_>, tracer: PhotonTracer, bandwidths: B, kernel: Kernel) -> Sppm<B> {
         let (width, height) = input.size();
         let samples = SampleBuffer::of_paths(width as usize * height as usize, input.settings.levels);
         let samples = SampleBuffer::with_lobes(samples, input.settings.lobes);
@@ -121,7 +121,7 @@ fn add_photons(all: &mut PixelSample, sample: &PixelSample) {
     all.rejection = all.rejection.or(sample.rejection);
 }
 
-impl<B: PixelBandwidths, K: Kernel> Integrator for Sppm<B, K> {
+impl<B: PixelBandwidths> Integrator for Sppm<B> {
     fn pixels(&mut self, input: &RenderInput<'_>) -> Vec<PixelAccumulator> {
         let InitialPixels { pixels, indirect_cap2 } = self.tracer.initial_pixels(input);
         self.bandwidths.start(&pixels, indirect_cap2);

@@ -17,9 +17,7 @@ use crate::estimator::bandwidth::SCREEN_CAP;
 use crate::estimator::rule::chi_squared::ChiSquaredSettings;
 use crate::estimator::rule::{memoryless, volume};
 use crate::estimator::{InitialBandwidth, PixelAccumulator, Schedule};
-use crate::photon::ByKind;
-#[cfg(doc)]
-use crate::photon::kernel;
+use crate::photon::{ByKind, Kernel};
 use crate::plan::{ClassSet, Owner, Search, classes_in};
 use crate::scene::{Scene, Survey};
 use crate::stop::Stop;
@@ -35,26 +33,6 @@ const MAX_DEFAULT_PHOTONS: u32 = 10_000_000;
 const PIXELS_PER_STEP: usize = 1 << 15;
 /// Default of [`Settings::photon_memory`] (bytes).
 pub const DEFAULT_MAP_MEMORY: u64 = 1 << 30;
-
-/// Kernel of photon density estimation: the weight of a photon by its distance.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
-#[serde(rename_all = "lowercase")]
-pub enum KernelChoice {
-    /// Constant within the bandwidth
-    ///
-    /// See [`kernel::Box`].
-    #[default]
-    Box,
-    /// Falls with the squared distance
-    ///
-    /// See [`kernel::Epanechnikov`].
-    Epanechnikov,
-    /// A normal distribution cut off at three standard deviations
-    ///
-    /// See [`kernel::Gaussian`].
-    Gaussian,
-}
 
 /// Rule that bandwidths of [`Method::Sppm`] follow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -120,7 +98,7 @@ pub struct Settings {
     /// Bandwidth rule of [`Method::Sppm`].
     pub radius_rule: RadiusRule,
     /// Kernel of [`Method::Sppm`] with the memoryless rule, and of [`Method::Appm`]. Other methods use the box kernel.
-    pub kernel: KernelChoice,
+    pub kernel: Kernel,
     /// Parameters of the bandwidth rule of [`Method::Cppm`].
     pub chi_squared: ChiSquaredSettings,
     /// Most segments of a path, from the camera to the light.
@@ -157,7 +135,7 @@ impl Default for Settings {
             alpha: memoryless::ALPHA,
             volume_alpha: volume::ALPHA,
             radius_rule: RadiusRule::Memoryless,
-            kernel: KernelChoice::Box,
+            kernel: Kernel::Box,
             chi_squared: ChiSquaredSettings::default(),
             max_depth: u32::MAX,
             iterations: Some(DEFAULT_ITERATIONS),

@@ -7,7 +7,7 @@ use caustique::estimator::rule::local::LocalStatistics;
 use caustique::estimator::rule::thinned::Thinned;
 use caustique::estimator::rule::{CountingRule, memoryless, volume};
 use caustique::math::{Frame, Vec3};
-use caustique::photon::kernel::{self, laplacian};
+use caustique::photon::kernel::laplacian;
 use caustique::photon::{Kernel, ThinningKey};
 use caustique::transport::FoundPhotons;
 use std::f64::consts::PI;
@@ -140,7 +140,7 @@ fn the_chi_squared_rule_decides_as_exact_counts_do() {
 /// 1e-5, the error of the f32 sums of contributions within a path.
 #[test]
 fn the_adaptive_rule_follows_its_sums() {
-    let rule = Adaptive::<kernel::Box>::default();
+    let rule = Adaptive { kernel: Kernel::Box };
     let (mut ours, frame) = ([rule.initial(1.0, 10.0, 0)], Frame::from_normal(Vec3::Z));
     let (mut shot, mut curvature, mut noise) = (Exact::default(), Exact::default(), Exact::default());
     let initial = 1.0f64;
@@ -166,8 +166,8 @@ fn the_adaptive_rule_follows_its_sums() {
     }
     let n = MILLION as f64;
     let squared = (curvature * curvature - noise).value() / (n * n);
-    let bias2 = f64::from(<kernel::Box as Kernel>::SECOND_MOMENT).powi(2) * squared;
-    let optimum = 2.0 * shot.value() / n * f64::from(<kernel::Box as Kernel>::ROUGHNESS) / (3.0 * PI * n * bias2);
+    let bias2 = f64::from(Kernel::Box.second_moment()).powi(2) * squared;
+    let optimum = 2.0 * shot.value() / n * f64::from(Kernel::Box.roughness()) / (3.0 * PI * n * bias2);
     let usual = memoryless::radius2_factor(MILLION + 1, 2.0 / 3.0);
     let expected = optimum.cbrt().clamp(usual / 64.0, 4.0 * usual);
     let error = (f64::from(ours[0].radius2) / expected - 1.0).abs();
