@@ -117,7 +117,7 @@ fn sphere_light_over_a_plane() {
     // The polyhedron of 128 segments is smaller than the sphere by 1e-3, and kernels average the curvature of the
     // irradiance.
     let check = Check { expected, bias: 2.5e-3, detects: 0.1 };
-    check_all(check, "sphere light", &scene, &all(), 1500, 0.06);
+    check_all(check, "sphere light", &scene, &all(), 600, 0.06);
 }
 
 /// A point light over a plane and its mirror image, which a path tracer cannot find.
@@ -429,7 +429,7 @@ fn furnace_box_with_any_numbers_of_samples() {
     let (scene, check) = furnace();
     for counts in COUNTS {
         let mean = |seed| {
-            let settings = with_counts(counts, settings(400, 0.1, seed));
+            let settings = with_counts(counts, settings(100, 0.1, seed));
             let rendered = render(&scene, settings.method, 8, &settings);
             (0..64).map(|i| value(&rendered, 0, i)).sum::<f64>() / 64.0
         };
