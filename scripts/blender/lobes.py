@@ -74,12 +74,6 @@ class Reader:
         socket = leaf.node.inputs.get(name)
         return None if socket is None else self.graph.value(socket, leaf.path)
 
-    def _warn_unless_zero(self, leaf, name, text):
-        """Warn with `text` if an input is not zero."""
-        value = self.get(leaf, name)
-        if value is not None and not (is_constant(value) and value in (0.0, BLACK)):
-            self.say(text)
-
     def normal(self, leaf, name="Normal"):
         """The socket of the shading normal, or None if it is not linked."""
         value = self.get(leaf, name)

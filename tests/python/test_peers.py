@@ -16,7 +16,6 @@ from lab import compare_scenes
 COMPARE = support.ROOT / "scripts" / "compare"
 DRIVERS = COMPARE / "peers"
 PEERS = support.ROOT / ".venv-peers"
-BPY = support.ROOT / ".venv-bpy"
 SIZE = (48, 27)
 
 

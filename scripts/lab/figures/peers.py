@@ -18,6 +18,7 @@ from PIL import Image
 from .. import peer_runs, references, renders
 from ..accuracy import geometric
 from ..cache import Failed, program
+from ..combiner_page import display
 from ..goals import FIGURES
 from ..options import options
 from ..picture_errors import Reference
@@ -37,9 +38,7 @@ def strip(name, pictures):
     white = max(float(np.quantile(pictures[-1].max(-1), WHITE)), 1e-9)
     shown = []
     for picture in pictures:
-        linear = np.clip(np.nan_to_num(picture) / white, 0, 1)
-        display = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.power(linear, 1 / 2.4) - 0.055)
-        image = Image.fromarray((255 * display + 0.5).astype(np.uint8))
+        image = display(picture, 1 / white)
         shown.append(image.resize((SHOWN, round(SHOWN * image.height / image.width)), Image.Resampling.LANCZOS))
     sheet = Image.new("RGB", (SHOWN * len(shown) + 4 * (len(shown) - 1), shown[0].height), "white")
     for index, image in enumerate(shown):
