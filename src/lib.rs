@@ -47,7 +47,7 @@ pub mod camera;
 
 pub mod scene;
 
-pub mod plan;
+pub mod path_class;
 
 pub mod photon;
 
@@ -63,9 +63,13 @@ pub mod combine;
 
 pub mod finish;
 
+pub mod plan;
+
 pub mod render;
 
 pub mod choose;
+
+pub mod advice;
 
 pub mod pipeline;
 

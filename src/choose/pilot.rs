@@ -3,7 +3,8 @@
 use super::pilot_settings::{EFFECTS_PHOTON_SHARE, pilot_settings};
 use super::weights::{self, WeighedEffect};
 use crate::camera::Camera;
-use crate::plan::{Effect, Presence};
+use crate::path_class::Effect;
+use crate::plan::Presence;
 use crate::render::{Candidate, Cost, Counts, DEFAULT_ITERATIONS, Method, Proxy, Settings};
 use crate::scene::{Scene, View};
 

@@ -1,10 +1,11 @@
 //! Settings of small renders of the same view, and the values that errors of their pixels are relative to.
 
-use crate::estimator::{InitialBandwidth, PixelAccumulator};
+use crate::estimator::PixelAccumulator;
 use crate::film::Size;
 use crate::finish::window;
 use crate::math::DVec3;
 use crate::photon::MAX_NEIGHBOURS;
+use crate::render::InitialBandwidth;
 use crate::render::{Levels, Settings, Shard};
 use crate::stat::median;
 use crate::transport::MAX_LEVELS;

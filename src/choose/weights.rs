@@ -10,7 +10,8 @@ use super::pilot_settings::{self, TRIMMED_PILOT_SHARE, mean, reference_values, r
 use crate::camera::Camera;
 use crate::estimator::PixelAccumulator;
 use crate::math::DVec3;
-use crate::plan::{ClassSet, Effect, Presence, switch};
+use crate::path_class::{ClassSet, Effect};
+use crate::plan::{Presence, switch};
 use crate::render::{Candidate, Cost, RenderInput, Session, Settings};
 use crate::scene::{Scene, View};
 use crate::stat::floor;

@@ -184,10 +184,10 @@ fn text(plan: &Plan, verbose: bool) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use caustique::path_class::{Effect, Switches};
     use caustique::pipeline::choose::Chosen;
     use caustique::pipeline::plan::{self, PlanInput};
     use caustique::plan::switch::Removed;
-    use caustique::plan::{Effect, Switches};
     use caustique::render::{Candidate, Method, Settings};
     use caustique::scene::{CameraRequest, Description, Scene};
 

@@ -1,6 +1,5 @@
 //! Estimates from samples: accumulators of pixels, errors, and the rules of bandwidths.
 
-pub mod bandwidth;
 mod coverage;
 mod error;
 mod pixel_accumulator;
@@ -9,7 +8,6 @@ mod rejected;
 pub mod rule;
 mod state;
 
-pub use bandwidth::InitialBandwidth;
 pub use coverage::Coverage;
 pub use error::SquaredError;
 pub use pixel_accumulator::{FAR, Parts, PixelAccumulator, QUARTERS};

@@ -15,8 +15,8 @@ use super::layers::{Layer, LayerSet, Plane, Sample};
 use crate::error::Result;
 use crate::estimator::{BandwidthState, FAR, Parts, PixelAccumulator, QUARTERS, SquaredError, variance_ratio};
 use crate::math::{DVec3, Vec3};
+use crate::path_class::{ClassSet, Part};
 use crate::photon::{ByKind, Kind};
-use crate::plan::{ClassSet, Part};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 

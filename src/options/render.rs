@@ -11,13 +11,13 @@ use super::scene::SceneOptions;
 use super::values::{BandwidthChoice, CropChoice, FrameSeed, GridChoice, MethodChoice, OnOff, filter};
 use crate::camera::Filter;
 use crate::error::{Error, Result};
-use crate::estimator::InitialBandwidth;
-use crate::estimator::bandwidth::SCREEN_CAP;
 use crate::estimator::rule::chi_squared::ChiSquaredSettings;
 use crate::estimator::rule::volume::ALPHA as VOLUME_ALPHA;
 use crate::finish::{DenoiserChoice, Finish};
 use crate::photon::Kernel;
 use crate::pipeline::{AutoRequest, MethodRequest, PictureRequest, with_light_paths};
+use crate::render::InitialBandwidth;
+use crate::render::SCREEN_CAP;
 use crate::render::{
     BandwidthRule, Candidate, Counts, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, LIGHT_PATH_STEPS,
     Levels, MAX_CONNECTIONS, MAX_LIGHT_PATHS_PER_PIXEL, Method, PHOTON_BYTES, RadiusRule, Settings, Shard,

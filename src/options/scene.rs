@@ -2,8 +2,8 @@
 
 use super::frames::{Frames, path_of_frame};
 use super::number::{Ranged, rgb, strength};
+use crate::path_class::Switches;
 use crate::pipeline::load::{Environment, SceneRequest};
-use crate::plan::Switches;
 use crate::scene::LightPreset;
 use crate::scene::gltf::{self, Glass, LightUnits, Pose};
 use serde::{Serialize, Serializer};

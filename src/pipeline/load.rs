@@ -3,7 +3,7 @@
 use crate::error::{Error, ErrorKind, Result};
 use crate::math::Rgb;
 use crate::memory;
-use crate::plan::EffectSet;
+use crate::path_class::EffectSet;
 use crate::plan::switch::{self, Removed};
 use crate::scene::description::{Description, EnvironmentDescription, EnvironmentSource};
 use crate::scene::{LightPreset, Scene, environment_file, gltf, light_preset, usd};

@@ -6,7 +6,7 @@ use super::request::Request;
 use crate::error::Result;
 use crate::film::MOTION;
 use crate::math::DVec2;
-use crate::plan::ClassSet;
+use crate::path_class::ClassSet;
 use crate::scene::gltf::MovingFile;
 use crate::scene::{Pose, Scene, TrianglePoint, View, usd};
 use crate::stop::Stop;

@@ -6,11 +6,13 @@ use super::layers;
 use super::load::Loaded;
 use super::memory::MemoryCheck;
 use super::request::{PictureRequest, Request};
+use crate::advice;
 use crate::camera::Camera;
 use crate::choose::{Choice, PilotResult};
 use crate::error::Result;
+use crate::path_class::Switches;
 use crate::plan::switch::Removed;
-use crate::plan::{self, Plan, Switches};
+use crate::plan::{self, Plan};
 use crate::render::Settings;
 use crate::render::output::layer_shape;
 use crate::scene::{Scene, View};
@@ -36,6 +38,7 @@ pub fn plan(PlanInput { chosen, max_depth, switches }: PlanInput<'_>, view: View
     let search = choice.map_or(method.search(), |choice| choice.settings.search());
     let request = plan::PlanRequest { method: method.name(), because: &because, search, max_depth, switches, removed };
     let mut plan = Plan::new(view.scene, view.camera, &request);
+    advice::add(&mut plan, view.scene, view.camera, &request);
     for weight in choice.iter().flat_map(|choice| &choice.weights) {
         let effect = &mut plan.effects[weight.effect as usize];
         if effect.present {

@@ -4,7 +4,7 @@ use super::finish::FinishRequest;
 use super::load::SceneRequest;
 use super::memory::MemoryLimit;
 use crate::film::{Naming, Selection};
-use crate::plan::Switches;
+use crate::path_class::Switches;
 use crate::render::{Candidate, Settings};
 use crate::scene::CameraRequest;
 use serde_json::Value;

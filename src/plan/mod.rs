@@ -1,25 +1,19 @@
-//! The plan of a render: the effects that the scene calls for and why, the techniques that simulate them, and likely
-//! mistakes in the scene.
+//! The plan of a render: the effects that the scene calls for and why, and the techniques that simulate them.
 //!
-//! [`PathClass`] is the class of a light path, and [`Search::owner`] is the technique that carries its light.
-//! `presence` lists the effects of a scene, `search` the effects that a method finds, [`switch`] removes effects that
-//! the user switches off, and `diagnosis` explains why an expected effect may be missing. The plan does not trace light
-//! paths; a pilot render measures the shares and costs in [`EffectPlan`].
+//! `presence` lists the effects of a scene, `search` the effects that a method finds, [`Search::owner`] the technique
+//! that carries the light of a path class, and [`switch`] removes effects that the user switches off. The plan does not
+//! trace light paths; a pilot render measures the shares and costs in [`EffectPlan`].
 
-mod class;
-mod diagnosis;
-mod effect;
-mod names;
+pub(crate) mod names;
 mod presence;
 mod search;
 pub mod switch;
 
-pub use class::{CameraSuffix, ClassSet, Event, LightPrefix, Part, PathClass, classes_in};
-pub use effect::{Effect, EffectSet, Switches};
 pub use presence::Presence;
 pub use search::{Owner, Search};
 
 use crate::camera::Camera;
+use crate::path_class::{Effect, Switches};
 use crate::scene::Scene;
 use serde::Serialize;
 use switch::Removed;
@@ -129,11 +123,8 @@ impl Plan {
             }
         }
         warnings.extend(request.max_depth.map(|most| depth_warning(most, &effects, scene)));
-        warnings.extend(diagnosis::warnings(scene, camera, request));
-        let reason_if_black = diagnosis::black::reason(scene, camera, &effects, request, !warnings.is_empty());
-        warnings.extend(diagnosis::terminator::stepped_shadows(scene));
         Plan {
-            reason_if_black,
+            reason_if_black: String::new(),
             scene: scene.source.display().to_string(),
             method: request.method.into(),
             because: request.because.into(),

@@ -11,13 +11,13 @@ const MAX_NAMES: usize = 3;
 const MAX_REASONS: usize = 4;
 
 /// Lists names, at most [`MAX_NAMES`] of them: `a, b, c and 12 more`.
-pub(super) fn truncate_names(names: &[String]) -> String {
+pub(crate) fn truncate_names(names: &[String]) -> String {
     let shown = names.iter().take(MAX_NAMES).cloned().collect::<Vec<_>>().join(", ");
     if names.len() > MAX_NAMES { format!("{shown} and {} more", names.len() - MAX_NAMES) } else { shown }
 }
 
 /// Keeps at most [`MAX_REASONS`] reasons for an effect, and appends the number of the others.
-pub(super) fn truncate_reasons(mut reasons: Vec<String>) -> Vec<String> {
+pub(crate) fn truncate_reasons(mut reasons: Vec<String>) -> Vec<String> {
     let more = reasons.len().saturating_sub(MAX_REASONS);
     if more > 0 {
         reasons.truncate(MAX_REASONS);
@@ -27,21 +27,21 @@ pub(super) fn truncate_reasons(mut reasons: Vec<String>) -> Vec<String> {
 }
 
 /// A material and the objects of the scene that use it, for messages.
-pub(super) struct UsedMaterial<'a> {
-    pub(super) material: &'a Material,
+pub(crate) struct UsedMaterial<'a> {
+    pub(crate) material: &'a Material,
     /// Quoted names of the objects, each once, in the scene's order.
-    pub(super) objects: Vec<String>,
+    pub(crate) objects: Vec<String>,
 }
 
 impl UsedMaterial<'_> {
     /// Describes the material in a message: `material "glass" on "Cube", "Ball" and 2 more`.
-    pub(super) fn label(&self) -> String {
+    pub(crate) fn label(&self) -> String {
         format!("material \"{}\" on {}", self.material.name, truncate_names(&self.objects))
     }
 }
 
 /// The materials that `instances` use; each item is the index of a material and the name of an object with it.
-pub(super) fn used_materials<'a>(
+pub(crate) fn used_materials<'a>(
     materials: &'a [Material],
     instances: impl Iterator<Item = (u32, &'a str)>,
 ) -> Vec<UsedMaterial<'a>> {
@@ -58,12 +58,12 @@ pub(super) fn used_materials<'a>(
 }
 
 /// The materials that the instances of a scene use.
-pub(super) fn used_in_scene(scene: &Scene) -> Vec<UsedMaterial<'_>> {
+pub(crate) fn used_in_scene(scene: &Scene) -> Vec<UsedMaterial<'_>> {
     used_materials(&scene.materials.list, scene.shapes.instances.iter().map(|i| (i.material, i.name.as_str())))
 }
 
 /// Names of the lights that have power and satisfy `which`; each emissive object is listed once.
-pub(super) fn lights(scene: &Scene, which: impl Fn(&Emitter) -> bool) -> Vec<String> {
+pub(crate) fn lights(scene: &Scene, which: impl Fn(&Emitter) -> bool) -> Vec<String> {
     let sky = scene.lights.sky();
     let mut known = HashSet::new();
     let emitters = scene.lights.emitters().iter().enumerate();

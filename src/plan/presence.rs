@@ -1,10 +1,10 @@
 //! Effects that a scene calls for, and the reasons, from scene and camera alone.
 
-use super::effect::Effect;
 use super::names::{UsedMaterial, lights, truncate_names, truncate_reasons, used_in_scene};
 use crate::camera::Camera;
 use crate::light::Light;
 use crate::material::{Alpha, Material};
+use crate::path_class::Effect;
 use crate::scene::Scene;
 
 /// The effects that a scene calls for: for each effect, the names of the materials, lights and so on that need it.

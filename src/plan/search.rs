@@ -1,7 +1,7 @@
 //! The techniques that a method combines, and the effects that they find.
 
-use super::class::{ClassSet, PathClass};
-use super::effect::Effect;
+use crate::path_class::Effect;
+use crate::path_class::{ClassSet, PathClass};
 use crate::scene::{Scene, Survey};
 
 /// Combination of techniques by which a method finds light.

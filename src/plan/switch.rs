@@ -1,12 +1,12 @@
 //! `--effects`: removes effects that are properties of the scene, from its description before the scene is built, or
 //! from a built scene to measure what they contribute.
 
-use super::effect::{Effect, EffectSet};
 use super::names::{truncate_reasons, used_materials};
 use super::presence::{ENVIRONMENT, SPACE, material_reasons};
 use crate::error::Result;
 use crate::material::{Alpha, Material, Materials};
 use crate::math::{Rgb, Vec4};
+use crate::path_class::{Effect, EffectSet};
 use crate::scene::{Description, Scene};
 use crate::texture::{Integers, Texels, Texture, TextureRef};
 use std::sync::Arc;

@@ -6,10 +6,10 @@
 mod support;
 
 use caustique::bsdf::Shading;
-use caustique::estimator::InitialBandwidth;
 use caustique::geometry::{Mesh, Surface};
 use caustique::material::Material;
 use caustique::math::{DVec3, Vec3};
+use caustique::render::InitialBandwidth;
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::{CameraRequest, Description, Scene};
 use caustique::transport::{LightVertex, MergePhoton};

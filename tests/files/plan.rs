@@ -7,8 +7,9 @@ mod presence;
 mod switch;
 
 use caustique::math::{DVec3, Vec3};
+use caustique::path_class::Switches;
 use caustique::plan::switch::Removed;
-use caustique::plan::{Plan, PlanRequest, Search, Switches};
+use caustique::plan::{Plan, PlanRequest, Search};
 use caustique::scene::Description;
 use support::scenes::{add, build, look_at, matte, quad, square};
 
@@ -33,7 +34,9 @@ fn plan_to(description: Description, search: Search, max_depth: Option<u32>) -> 
     let removed = Removed::default();
     let asked =
         PlanRequest { method: "any", because: "", search, max_depth, switches: Switches::default(), removed: &removed };
-    Plan::new(&scene, &camera, &asked)
+    let mut plan = Plan::new(&scene, &camera, &asked);
+    caustique::advice::add(&mut plan, &scene, &camera, &asked);
+    plan
 }
 
 fn plan(description: Description) -> Plan {

@@ -6,10 +6,10 @@
 
 use crate::support;
 
-use caustique::estimator::InitialBandwidth;
 use caustique::material::Material;
 use caustique::math::{DVec3, Rgb, Vec3};
 use caustique::random::{Domain, Stream};
+use caustique::render::InitialBandwidth;
 use caustique::render::{Control, Levels, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};

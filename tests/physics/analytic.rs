@@ -7,11 +7,11 @@
 
 use crate::support;
 
-use caustique::estimator::InitialBandwidth;
 use caustique::light::Light;
 use caustique::material::{Alpha, Material, MediumParameters};
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
 use caustique::random::{Domain, Stream};
+use caustique::render::InitialBandwidth;
 use caustique::render::{Control, Levels, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
 use caustique::scene::{Description, Scene};

@@ -7,9 +7,9 @@
 
 use crate::support;
 
-use caustique::estimator::InitialBandwidth;
 use caustique::material::{Alpha, Material, MediumParameters};
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
+use caustique::render::InitialBandwidth;
 use caustique::render::{Counts, Levels, Method, Rendered, Settings, Shard};
 use caustique::scene::description::{
     EnvironmentDescription, EnvironmentSource, Projection, PunctualKind, PunctualLight,

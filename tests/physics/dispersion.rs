@@ -8,11 +8,11 @@ use crate::support;
 
 use bumpalo::Bump;
 use caustique::bsdf::{BsdfSample, Transport};
-use caustique::estimator::InitialBandwidth;
 use caustique::geometry::Mesh;
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
 use caustique::random::{Domain, Purpose, Stream};
+use caustique::render::InitialBandwidth;
 use caustique::render::{Levels, Method, Rendered, Settings};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
 use caustique::scene::{Description, Scene};

@@ -8,9 +8,9 @@
 
 use crate::support;
 
-use caustique::estimator::InitialBandwidth;
 use caustique::material::Material;
 use caustique::math::{DVec3, Rgb, Vec2, Vec3, Vec4};
+use caustique::render::InitialBandwidth;
 use caustique::render::{Control, Method, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};

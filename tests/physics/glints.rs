@@ -2,10 +2,10 @@
 
 use crate::support;
 
-use caustique::estimator::InitialBandwidth;
 use caustique::material::Material;
 use caustique::math::{DVec3, Vec3};
 use caustique::photon::Kind;
+use caustique::render::InitialBandwidth;
 use caustique::render::{Control, Levels, Method, RadiusRule, Settings, render};
 use caustique::scene::{Description, Scene};
 use caustique::transport::Indirect;

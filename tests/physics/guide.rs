@@ -7,14 +7,16 @@
 use crate::support;
 
 use caustique::choose::{Choice, EffectWeight, choose};
-use caustique::estimator::{InitialBandwidth, PixelAccumulator};
+use caustique::estimator::PixelAccumulator;
 use caustique::light::{Guide, Pattern, Profile, Region, SpotEdge};
 use caustique::material::Material;
 use caustique::math::{DVec3, Rgb, Vec2, Vec3};
 use caustique::medium::MediumParameters;
-use caustique::plan::{ClassSet, Effect, PathClass, switch};
+use caustique::path_class::{ClassSet, Effect, PathClass};
+use caustique::plan::switch;
 use caustique::random::Domain;
 use caustique::render::Candidate;
+use caustique::render::InitialBandwidth;
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::Survey;
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};

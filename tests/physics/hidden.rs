@@ -6,9 +6,9 @@
 
 use crate::support;
 
-use caustique::estimator::InitialBandwidth;
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
+use caustique::render::InitialBandwidth;
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::Description;
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};

@@ -6,10 +6,10 @@
 
 use crate::support;
 
-use caustique::estimator::InitialBandwidth;
 use caustique::light::SpotEdge;
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec3};
+use caustique::render::InitialBandwidth;
 use caustique::render::{Control, Method, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
 use caustique::scene::{Description, Scene};

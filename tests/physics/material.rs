@@ -7,7 +7,8 @@ use caustique::bsdf::{Bsdf, EnergyTables, Interface, LobeSet, Parameters, Shadin
 use caustique::geometry::Surface;
 use caustique::material::Material;
 use caustique::math::{DAffine3, DMat3, DVec3, Frame, Rgb, Vec2, Vec3, Vec4};
-use caustique::plan::{Effect, switch};
+use caustique::path_class::Effect;
+use caustique::plan::switch;
 use caustique::random::mix;
 use caustique::scene::Description;
 use caustique::texture::{Texels, Texture, TextureRef, Wrap};

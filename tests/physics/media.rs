@@ -6,12 +6,12 @@
 
 use crate::support;
 
-use caustique::estimator::InitialBandwidth;
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec2, Vec3};
 use caustique::medium::HenyeyGreenstein;
 use caustique::photon::Kernel;
 use caustique::random::{Domain, Purpose, Stream};
+use caustique::render::InitialBandwidth;
 use caustique::render::{Levels, Method, Settings};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};

@@ -6,9 +6,10 @@
 
 use crate::support;
 
-use caustique::estimator::{InitialBandwidth, PixelAccumulator, SquaredError};
+use caustique::estimator::{PixelAccumulator, SquaredError};
 use caustique::material::Material;
 use caustique::math::{DVec3, Vec3};
+use caustique::render::InitialBandwidth;
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::{Description, Scene};
 use caustique::transport::{InitialMedia, VertexCounts};

@@ -17,12 +17,12 @@ use caustique::light::{EmissionDensity, Emitter, Light, Receiver, TriangleLight}
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec3};
 use caustique::medium::{FlightDensity, HenyeyGreenstein};
+use caustique::path_class::ClassSet;
 use caustique::photon::PhotonMap;
-use caustique::plan::ClassSet;
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
-use caustique::transport::mis::{self, Eta, Merges, MisState, Ratios, one_merge};
+use caustique::transport::bidirectional::mis::{self, Eta, Merges, MisState, Ratios, one_merge};
 use caustique::transport::{
     Bidirectional, CameraPaths, CameraWalkContext, Deposits, Indirect, InitialMedia, LightPaths, LightVertices,
     MediumVertex, MergeLevels, Next, PathRecorder, PathStart, PixelSample, SPARED_BY_ROULETTE, Scattered, Technique,

@@ -7,7 +7,7 @@
 use crate::support;
 
 use caustique::math::{DVec3, Vec3};
-use caustique::plan::{ClassSet, Effect};
+use caustique::path_class::{ClassSet, Effect};
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::render::{Candidate, Control, Counts, Levels, Proxy, Settings, render};
 use caustique::scene::{Description, Scene};

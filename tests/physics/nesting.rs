@@ -2,14 +2,14 @@
 
 use crate::support;
 
-use caustique::estimator::InitialBandwidth;
 use caustique::geometry::Mesh;
 use caustique::material::{Alpha, Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec3};
+use caustique::path_class::{ClassSet, Switches};
 use caustique::pipeline::choose::Chosen;
 use caustique::pipeline::plan::{PlanInput, plan};
-use caustique::plan::{ClassSet, Switches};
 use caustique::random::{Domain, Stream};
+use caustique::render::InitialBandwidth;
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, Projection};
 use caustique::scene::{Description, Scene, View};

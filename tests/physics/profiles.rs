@@ -6,10 +6,10 @@
 
 use crate::support;
 
-use caustique::estimator::InitialBandwidth;
 use caustique::light::{Light, Pattern, Picture, Profile, Receiver, SpotEdge};
 use caustique::math::{DAffine3, DMat3, DVec3, Rgb, Vec2, Vec3};
 use caustique::random::{Domain, Purpose, Stream};
+use caustique::render::InitialBandwidth;
 use caustique::render::{Control, Method, Settings, render};
 use caustique::scene::description::{CameraDescription, Projection, PunctualKind, PunctualLight};
 use caustique::scene::ies::{self, Turn};

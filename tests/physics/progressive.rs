@@ -5,12 +5,12 @@
 
 use crate::support;
 
-use caustique::estimator::InitialBandwidth;
 use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
 use caustique::estimator::rule::memoryless::radius2_factor;
 use caustique::math::{DVec3, Vec3};
 use caustique::photon::{Kernel, Kind};
 use caustique::random::{Domain, QUARTERS, quarter};
+use caustique::render::InitialBandwidth;
 use caustique::render::{Control, Levels, Method, RadiusRule, Rendered, Settings, render};
 use caustique::scene::description::PunctualLight;
 use caustique::scene::{Description, Scene};

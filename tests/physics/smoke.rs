@@ -6,11 +6,11 @@
 
 use crate::support;
 
-use caustique::estimator::InitialBandwidth;
 use caustique::material::{Alpha, Material, MediumGrids, MediumParameters};
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
 use caustique::medium::{DensityGrid, EmissionGrid, Grid};
 use caustique::random::HashSequence;
+use caustique::render::InitialBandwidth;
 use caustique::render::{Levels, Method, Rendered, Settings};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};

@@ -6,10 +6,10 @@
 use crate::support;
 
 use bumpalo::Bump;
-use caustique::estimator::InitialBandwidth;
 use caustique::material::Material;
 use caustique::math::{Rgb, Vec3};
 use caustique::random::{Domain, Stream};
+use caustique::render::InitialBandwidth;
 use caustique::render::{Levels, Method, Settings};
 use caustique::scene::Scene;
 use caustique::spectrum::{SPREAD, Wavelength, WavelengthSample};

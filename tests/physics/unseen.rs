@@ -2,9 +2,10 @@
 
 use crate::support;
 
-use caustique::estimator::{InitialBandwidth, PixelAccumulator};
+use caustique::estimator::PixelAccumulator;
 use caustique::finish::{DenoiserChoice, Finish};
 use caustique::math::{DVec3, Vec3};
+use caustique::render::InitialBandwidth;
 use caustique::render::{
     Accuracy, Levels, Method, RenderInput, Rendered, Session, Settings, Shard, ShardResult, StopReason,
 };

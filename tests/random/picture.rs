@@ -8,8 +8,9 @@ use caustique::camera::Camera;
 use caustique::material::{Material, MediumGrids};
 use caustique::math::Vec3;
 use caustique::medium::{DensityGrid, EmissionGrid, Grid};
+use caustique::path_class::{Effect, Switches};
 use caustique::plan::switch::Removed;
-use caustique::plan::{Effect, EffectPlan, Plan, PlanRequest, Switches};
+use caustique::plan::{EffectPlan, Plan, PlanRequest};
 use caustique::render::{
     Control, Levels, Method, Motion, RenderInput, Rendered, Session, Settings, render, run_session,
 };

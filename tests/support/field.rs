@@ -6,8 +6,9 @@
 //! Poisson process.
 
 use super::scenes::{add, build, look_at, matte, mirror, point_light, quad};
-use caustique::estimator::{InitialBandwidth, PixelAccumulator};
+use caustique::estimator::PixelAccumulator;
 use caustique::math::{DVec3, Vec3};
+use caustique::render::InitialBandwidth;
 use caustique::render::{Levels, Settings};
 use caustique::scene::description::Projection;
 use caustique::scene::{CameraRequest, Description, Scene};

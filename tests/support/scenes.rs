@@ -4,7 +4,7 @@ use caustique::camera::Camera;
 use caustique::geometry::Mesh;
 use caustique::material::Material;
 use caustique::math::{DAffine3, DMat3, DVec3, Rgb, Vec3};
-use caustique::plan::ClassSet;
+use caustique::path_class::ClassSet;
 use caustique::scene::description::{
     CameraDescription, Description, PlacedMesh, Projection, PunctualKind, PunctualLight,
 };

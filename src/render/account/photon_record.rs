@@ -22,8 +22,9 @@
 use super::pixel_state::PixelState;
 use crate::estimator::{FAR, PixelAccumulator};
 use crate::math::Vec3;
+use crate::path_class::{ClassSet, Part, classes_in};
 use crate::photon::{ByKind, Kind};
-use crate::plan::{ClassSet, Owner, Part, classes_in};
+use crate::plan::Owner;
 use crate::render::pass::PhotonCounts;
 use crate::render::settings::Settings;
 use crate::scene::Scene;

@@ -12,6 +12,8 @@
 //! the second. The pairs share nothing but the photons, which both light paths leave.
 
 use super::guiding::{guide_at, learn_guide};
+use super::initial_bandwidth::InitialBandwidth;
+use super::initial_bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
 use super::integrator::{Integrator, Work};
 use super::light_cells::{LightCells, TracedPaths};
 use super::photon_counts::PhotonCounts;
@@ -19,11 +21,10 @@ use super::sample_buffer::{self, SampleBuffer, SampleBufferPart};
 use super::techniques::{FilmRecorder, TechniquePicture, TileRecorder};
 use super::tiles::{BLOCK, PixelBlock, SlotPixel, TILE_PIXELS, Tiles, WholeTile};
 use crate::camera::{GROUP_SIZE, TilePixel};
-use crate::estimator::bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
-use crate::estimator::{InitialBandwidth, PixelAccumulator, Schedule, level_factor2};
+use crate::estimator::{PixelAccumulator, Schedule, level_factor2};
 use crate::light::Guide;
+use crate::path_class::{CameraSuffix, Event, Part};
 use crate::photon::{ByKind, PhotonMap};
-use crate::plan::{CameraSuffix, Event, Part};
 use crate::random::{Domain, Purpose, Streams};
 use crate::render::clock::Phases;
 use crate::render::clock::cpu_seconds;
@@ -31,7 +32,7 @@ use crate::render::input::RenderInput;
 use crate::render::settings::Settings;
 use crate::spectrum::{IterationWavelengths, WavelengthSample};
 use crate::stat::median;
-use crate::transport::mis::Eta;
+use crate::transport::bidirectional::mis::Eta;
 use crate::transport::{
     Bidirectional, CameraPathStart, CameraWalkContext, Deposits, FirstScatter, LightPaths, LightVertex, LightVertices,
     MergeLevels, MergePhoton, PixelSample, SPARED_BY_ROULETTE, Splat, TechniqueSet,

@@ -2,7 +2,7 @@
 
 use super::tiles::TILE_PIXELS;
 use crate::math::Rgb;
-use crate::plan::Part;
+use crate::path_class::Part;
 use crate::transport::{LobeLight, PathKind, Technique};
 
 /// Radiance from one light group (lights with a layer of their own): all of it, and its caustics alone.

@@ -20,12 +20,12 @@ use super::tiles::{TILE_PIXELS, Tiles};
 use crate::camera::Camera;
 use crate::estimator::PixelAccumulator;
 use crate::math::{Rgb, UVec2, Vec2};
-use crate::plan::{Part, PathClass};
+use crate::path_class::{Part, PathClass};
 use crate::random::{Chain, Domain, Purpose, Stream, Streams, mix};
 use crate::render::clock::{Phases, cpu_seconds};
 use crate::render::input::RenderInput;
 use crate::render::settings::Settings;
-use crate::transport::mis::Eta;
+use crate::transport::bidirectional::mis::Eta;
 use crate::transport::{
     Bidirectional, CameraWalkContext, Deposits, Division, FirstScatter, LightPaths, LightVertices, LobeLight,
     MergeLevels, PathKind, PathRecorder, PixelSample, Splat, Technique, TechniqueSet,

@@ -14,22 +14,23 @@
 //! Direct light is sampled alike by all candidates. Its variance is measured, and is the same for all of them.
 
 use super::guiding::learn_guide;
+use super::initial_bandwidth::InitialBandwidth;
+use super::initial_bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
 use super::survival::{CameraSurvival, LightSurvival, PhotonSurvival};
 use crate::camera::{Camera, GROUP_SIZE, TilePixel};
-use crate::estimator::bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
-use crate::estimator::{InitialBandwidth, level_factor2};
+use crate::estimator::level_factor2;
 use crate::film::Size;
 use crate::finish::window;
 use crate::light::Guide;
 use crate::math::{Rgb, Vec3};
+use crate::path_class::{Part, PathClass};
 use crate::photon::PhotonMap;
-use crate::plan::{Part, PathClass};
 use crate::random::{Domain, Streams};
 use crate::render::settings::{Counts, Settings};
 use crate::scene::Scene;
 use crate::spectrum::IterationWavelengths;
 use crate::stat::{floor, median};
-use crate::transport::mis::{Eta, Merges, Ratios};
+use crate::transport::bidirectional::mis::{Eta, Merges, Ratios};
 use crate::transport::{
     Bidirectional, CameraPathStart, CameraWalkContext, Deposits, InitialMedia, LightPaths, LightVertices, MergeLevels,
     MergePhoton, PathKind, PathRecorder, PixelSample, SPARED_BY_ROULETTE, Technique, TechniqueSet,

@@ -2,12 +2,13 @@
 //! pilot.
 
 use super::guiding::{guide_at, learn_guide};
+use super::initial_bandwidth::InitialBandwidth;
+use super::initial_bandwidth::{initial_bandwidths, initial_volume_bandwidths, median_radius2};
 use super::integrator::Work;
 use super::light_path_ranges::light_path_ranges;
 use super::region::region;
 use super::volume::{Maps, VolumeMap};
-use crate::estimator::bandwidth::{initial_bandwidths, initial_volume_bandwidths, median_radius2};
-use crate::estimator::{InitialBandwidth, PixelAccumulator};
+use crate::estimator::PixelAccumulator;
 use crate::light::{Guide, Region};
 use crate::photon::{Kind, PhotonMap, kind};
 use crate::random::Domain;

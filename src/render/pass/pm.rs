@@ -11,12 +11,13 @@
 //! When memory is full, tracing ends with the last light path whose photons all fit, and fluxes are divided by the
 //! number of traced paths.
 
+use super::initial_bandwidth::InitialBandwidth;
+use super::initial_bandwidth::{MIN_RADIUS_RATIO, SCREEN_CAP, picture_width_at};
 use super::integrator::{Integrator, Work};
 use super::photon_tracer::trace_range;
 use super::sample_buffer::{self, SampleBuffer};
 use crate::camera::{Camera, par_pixels, pixels_per_band};
-use crate::estimator::bandwidth::{MIN_RADIUS_RATIO, SCREEN_CAP, picture_width_at};
-use crate::estimator::{InitialBandwidth, PixelAccumulator};
+use crate::estimator::PixelAccumulator;
 use crate::math::Vec3;
 use crate::photon::{ByKind, Kernel, Kind, MAX_NEIGHBOURS, Nearest, Photon, PhotonMap, PhotonMaps, kind};
 use crate::random::{Domain, Streams};

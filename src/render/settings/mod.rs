@@ -13,12 +13,14 @@ pub use method::{BandwidthRule, DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_PHOTON
 pub use shard::{MAX_SHARDS, Shard};
 
 use crate::camera::Camera;
-use crate::estimator::bandwidth::SCREEN_CAP;
 use crate::estimator::rule::chi_squared::ChiSquaredSettings;
 use crate::estimator::rule::{memoryless, volume};
-use crate::estimator::{InitialBandwidth, PixelAccumulator, Schedule};
+use crate::estimator::{PixelAccumulator, Schedule};
+use crate::path_class::{ClassSet, classes_in};
 use crate::photon::{ByKind, Kernel};
-use crate::plan::{ClassSet, Owner, Search, classes_in};
+use crate::plan::{Owner, Search};
+use crate::render::InitialBandwidth;
+use crate::render::SCREEN_CAP;
 use crate::scene::{Scene, Survey};
 use crate::stop::Stop;
 use crate::transport::{CameraPaths, Indirect, InitialMedia, MAX_LEVELS, MAX_SPLITS};

@@ -4,7 +4,8 @@ use super::{floor, plan, plan_by};
 use crate::support::scenes::{add, glass, matte, mirror, point_light, quad, sphere};
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec3};
-use caustique::plan::{Effect, Plan, Search};
+use caustique::path_class::Effect;
+use caustique::plan::{Plan, Search};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 
 fn present(plan: &Plan) -> String {

@@ -6,7 +6,8 @@ use crate::support::scenes::{add, build, glass, matte, point_light, quad, square
 use caustique::camera::Camera;
 use caustique::material::{Alpha, Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec2, Vec3};
-use caustique::plan::{Effect, EffectSet, switch};
+use caustique::path_class::{Effect, EffectSet};
+use caustique::plan::switch;
 use caustique::render::output::layer_shape;
 use caustique::render::{Control, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};

@@ -2,7 +2,8 @@
 
 use super::room;
 use caustique::bsdf::{LobeSet, Transport};
-use caustique::plan::{CameraSuffix, Event, LightPrefix, Owner, PathClass, Search};
+use caustique::path_class::{CameraSuffix, Event, LightPrefix, PathClass};
+use caustique::plan::{Owner, Search};
 use caustique::random::{Domain, Stream};
 use caustique::scene::{Scene, gltf};
 use caustique::transport::{
@@ -87,7 +88,7 @@ impl<'a> Visitor<'a> for Scribe<'_> {
 fn random_paths(scene: &Scene, walks: u32, found: &mut HashSet<Whole>) {
     let camera = scene.camera(&crate::support::scenes::square(64)).expect("a camera");
     let initial_media = InitialMedia::new(scene, camera.position());
-    let classes = caustique::plan::ClassSet::ALL;
+    let classes = caustique::path_class::ClassSet::ALL;
     let (interior, indirect) = (initial_media.camera, Indirect::Photons);
     let camera_paths = CameraPaths {
         scene,

@@ -6,7 +6,7 @@ use caustique::light::{EmissionDensity, Guide};
 use caustique::math::{DVec3, Vec3};
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::scene::Description;
-use caustique::transport::mis::{self, End, Eta, Merges, MisState, one_merge};
+use caustique::transport::bidirectional::mis::{self, End, Eta, Merges, MisState, one_merge};
 use caustique::transport::{InitialMedia, LightPaths, TechniqueSet};
 
 const PATHS: u64 = 100_000;
