@@ -3,10 +3,8 @@
 
 use crate::math::Vec3;
 use crate::photon::{ByKind, Kind, PhotonMap, ThinningKey};
+use crate::transport::walk::pixel_sample::MAX_LEVELS;
 use wide::f32x8;
-
-/// Largest number of bandwidth levels (gathering radii) of one camera path.
-pub const MAX_LEVELS: usize = 5;
 
 /// Squared gathering radii of the bandwidth levels of one camera path, in ascending order.
 #[derive(Clone, Copy, Debug)]

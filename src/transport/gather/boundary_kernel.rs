@@ -13,9 +13,9 @@ use crate::random::Purpose;
 use crate::scene::Scene;
 use crate::scene::contact::RaySurfaces;
 use crate::trace::{Hit, Ray};
-use crate::transport::gather::bandwidths::MAX_LEVELS;
 use crate::transport::gather::volume::Volume;
 use crate::transport::walk::interior::Interior;
+use crate::transport::walk::pixel_sample::MAX_LEVELS;
 use crate::transport::walk::segment::token;
 use crate::transport::walk::vertex::MediumVertex;
 

@@ -39,7 +39,7 @@ use crate::transport::walk::direct::{
 };
 use crate::transport::walk::lobe_layers::{FirstScatter, LobeHistory, LobeRecord};
 use crate::transport::walk::pass_through::{BulbHit, PassThroughHit};
-use crate::transport::walk::pixel_sample::{BranchFeatures, PixelSample};
+use crate::transport::walk::pixel_sample::{BranchFeatures, MAX_LEVELS, PixelSample};
 use crate::transport::walk::scattering_vertex::ScatterPoint;
 use crate::transport::walk::segment::FirstHit;
 use crate::transport::walk::vertex::{MediumLight, MediumVertex, Next, Scattered, Vertex, Visitor};
@@ -456,11 +456,7 @@ impl<B: GatherBandwidths> GatheringWalk<'_, B> {
     /// Radiance by bandwidth level from the photons around a vertex in a medium; zero if the picture does not show
     /// their class.
     #[inline]
-    fn gather_in_medium(
-        &mut self,
-        vertex: &MediumVertex,
-        suffix: CameraSuffix,
-    ) -> Option<[Rgb; crate::transport::gather::bandwidths::MAX_LEVELS]> {
+    fn gather_in_medium(&mut self, vertex: &MediumVertex, suffix: CameraSuffix) -> Option<[Rgb; MAX_LEVELS]> {
         let longest = self.max_depth - vertex.depth;
         let medium = vertex.medium_id(self.scene);
         let wanted = self.classes.has(suffix.then(Event::Medium).class_with(LightPrefix::SCATTERED));

@@ -18,7 +18,8 @@ use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use crate::light::EmissionDensity;
 use crate::math::{Rgb, Vec3};
 use crate::photon::{Kernel, Photon, PhotonFlags, PhotonMap};
-use crate::transport::gather::bandwidths::{LevelRadii, MAX_LEVELS};
+use crate::transport::gather::bandwidths::LevelRadii;
+use crate::transport::walk::pixel_sample::MAX_LEVELS;
 use std::f32::consts::PI;
 
 /// The lobes by which a path may continue, and the probability that it does.

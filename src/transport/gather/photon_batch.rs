@@ -3,8 +3,9 @@
 use crate::bsdf::{Gathering, LobeSet};
 use crate::math::{Rgb, Vec3};
 use crate::photon::{ByKind, Kernel, Near, Photon, PhotonFlags, VolumePhoton};
-use crate::transport::gather::bandwidths::{FoundPhotons, MAX_LEVELS, PhotonCounter, first_lane};
+use crate::transport::gather::bandwidths::{FoundPhotons, PhotonCounter, first_lane};
 use crate::transport::walk::lobe_layers::LobeRecord;
+use crate::transport::walk::pixel_sample::MAX_LEVELS;
 use crate::transport::walk::vertex::Vertex;
 use bumpalo::Bump;
 use wide::{CmpEq, CmpLt, f32x8};

@@ -7,7 +7,7 @@
 
 use crate::math::Rgb;
 use crate::photon::{Kernel, NO_NORMAL, Near, PhotonMap, VolumePhoton};
-use crate::transport::gather::bandwidths::MAX_LEVELS;
+use crate::transport::walk::pixel_sample::MAX_LEVELS;
 use crate::transport::walk::vertex::MediumVertex;
 use std::f32::consts::FRAC_1_PI;
 

@@ -2,9 +2,11 @@
 
 use crate::bsdf::LobeSet;
 use crate::math::{Rgb, Vec3};
-use crate::transport::gather::bandwidths::MAX_LEVELS;
 use crate::transport::walk::cause::Cause;
 use crate::transport::walk::segment::FirstHit;
+
+/// Largest number of bandwidth levels (gathering radii) of one camera path.
+pub const MAX_LEVELS: usize = 5;
 
 /// G-buffer of one camera path, at its first vertex that scatters broadly; at its last narrow one if there is none, and
 /// zero if all are perfect mirrors or clear glass. If the path is split, albedo and normal are sums over its branches,
