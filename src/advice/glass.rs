@@ -31,7 +31,7 @@ const MIN_TRANSPARENT_SHARE: f32 = 0.9;
 const MAX_FACES: usize = 256;
 
 fn is_glass(material: &Material) -> bool {
-    material.transmission >= 0.5 && material.ior != 1.0
+    material.transmission.factor >= 0.5 && material.ior != 1.0
 }
 
 /// Warnings about curved glass objects that are thin walls. Most are meant to be solid, and are thin because the
@@ -74,7 +74,7 @@ pub(super) fn frosted_glass(scene: &Scene) -> Vec<String> {
     let warning = |material: &Material, label: String| {
         format!(
             "{label}: its roughness of {} spreads light too wide for a caustic to show; {MAX_FOCUSING_ROUGHNESS} and more is frosted",
-            material.roughness
+            material.roughness.factor
         )
     };
     let used = used_in_scene(scene);
@@ -89,8 +89,9 @@ pub(super) fn alpha_glass(scene: &Scene) -> Vec<String> {
     let mut named = Vec::new();
     for (index, instance) in scene.shapes.instances.iter().enumerate() {
         let material = &materials[instance.material as usize];
-        let smooth = material.metallic < 0.5 && material.roughness < MAX_FOCUSING_ROUGHNESS && !material.unlit;
-        if material.alpha != Alpha::Blend || !smooth || material.transmission >= 0.5 {
+        let smooth =
+            material.metallic.factor < 0.5 && material.roughness.factor < MAX_FOCUSING_ROUGHNESS && !material.unlit;
+        if material.alpha != Alpha::Blend || !smooth || material.transmission.factor >= 0.5 {
             continue;
         }
         if let Some(alpha) = alpha_of_body(scene, index as u32) {

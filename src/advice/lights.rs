@@ -220,7 +220,7 @@ pub(super) fn delta_lights_behind_glass(scene: &Scene, request: &PlanRequest) ->
         for (token, (origin, direction)) in source.rays.into_iter().enumerate() {
             let Some(surface) = rays::first(scene, origin, direction, f32::INFINITY, token as u32) else { continue };
             let material = &scene.materials.list[surface.material as usize];
-            if material.transmission > 0.0 && (material.thin || material.ior != 1.0) {
+            if material.transmission.factor > 0.0 && (material.thin || material.ior != 1.0) {
                 let name = format!("\"{}\"", scene.shapes.instances[surface.instance as usize].name);
                 *panes.entry(name).or_insert(0usize) += 1;
             }

@@ -21,7 +21,10 @@ pub(super) fn stepped_shadows(scene: &Scene) -> Option<String> {
     let mut objects = BTreeSet::new();
     for (index, instance) in scene.shapes.instances.iter().enumerate() {
         let material = &scene.materials.list[instance.material as usize];
-        let matte = material.transmission < 0.5 && material.metallic < 0.5 && !material.unlit && !material.emits();
+        let matte = material.transmission.factor < 0.5
+            && material.metallic.factor < 0.5
+            && !material.unlit
+            && !material.emits();
         if matte && !objects.contains(&instance.object) && median_angle(scene, index as u32) > MAX_ANGLE {
             objects.insert(instance.object);
         }

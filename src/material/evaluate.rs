@@ -8,7 +8,7 @@ use crate::texture::{Texture, TextureRef};
 
 /// Looks up a texture at a surface point. White if there is no texture, or if its index is past the list.
 #[inline]
-fn look_up(texture: &Option<TextureRef>, surface: &Surface, textures: &[Texture]) -> Vec4 {
+pub(super) fn look_up(texture: &Option<TextureRef>, surface: &Surface, textures: &[Texture]) -> Vec4 {
     let Some(reference) = texture else { return Vec4::ONE };
     match textures.get(reference.texture as usize) {
         Some(texture) => texture.sample(reference.coordinates(surface.uv)),
@@ -18,7 +18,7 @@ fn look_up(texture: &Option<TextureRef>, surface: &Surface, textures: &[Texture]
 
 /// Clamps a number to `[0, 1]`; NaN becomes 0.
 #[inline]
-fn unit(x: f32) -> f32 {
+pub(super) fn unit(x: f32) -> f32 {
     if x > 0.0 { x.min(1.0) } else { 0.0 }
 }
 
@@ -40,23 +40,16 @@ impl Material {
     #[inline]
     pub fn base_and_shares(&self, surface: &Surface, textures: &[Texture]) -> (Rgb, f32, f32) {
         let base = unit_color(self.base(surface, textures).truncate());
-        let (mut metallic, mut transmission) = (unit(self.metallic), unit(self.transmission));
-        if metallic > 0.0 && self.metallic_roughness_texture.is_some() {
-            metallic *= unit(look_up(&self.metallic_roughness_texture, surface, textures).z);
-        }
-        if transmission > 0.0 && self.transmission_texture.is_some() {
-            transmission *= unit(look_up(&self.transmission_texture, surface, textures).x);
-        }
-        (base, metallic, transmission)
+        (base, self.metallic.at(surface, textures), self.transmission.at(surface, textures))
     }
 
     /// [`Material::base_and_shares`] of a material without textures for them, with a base colour that is neither
     /// multiplied by the vertex colour nor clamped. `None` if there are such textures.
     pub(super) fn untextured_shares(&self) -> Option<(Vec4, f32, f32)> {
-        let (metallic, transmission) = (unit(self.metallic), unit(self.transmission));
+        let (metallic, transmission) = (unit(self.metallic.factor), unit(self.transmission.factor));
         let textured = self.base_color_texture.is_some()
-            || (metallic > 0.0 && self.metallic_roughness_texture.is_some())
-            || (transmission > 0.0 && self.transmission_texture.is_some());
+            || (metallic > 0.0 && self.metallic.texture.is_some())
+            || (transmission > 0.0 && self.transmission.texture.is_some());
         (!textured).then_some((Vec4::from_array(self.base_color), metallic, transmission))
     }
 
@@ -68,30 +61,8 @@ impl Material {
     /// Normal of the clear coat: the interpolated normal, or the one of the coat's own map, which the mesh must have
     /// tangents for.
     pub fn coat_normal(&self, surface: &Surface, textures: &[Texture]) -> Vec3 {
-        let map = self.clearcoat_normal_texture.as_ref().filter(|_| self.clearcoat > 0.0);
+        let map = self.clearcoat_normal_texture.as_ref().filter(|_| self.clearcoat.factor > 0.0);
         map.and_then(|map| mapped_normal(map, surface, textures)).unwrap_or(surface.ns)
-    }
-
-    /// Whether no texture affects the interface, so that all surfaces of the material can share one.
-    pub fn has_plain_interface(&self) -> bool {
-        let textures = [
-            &self.diffuse_roughness_texture,
-            &self.metallic_roughness_texture,
-            &self.anisotropy_texture,
-            &self.diffuse_transmission_texture,
-            &self.diffuse_transmission_color_texture,
-            &self.specular_texture,
-            &self.specular_color_texture,
-            &self.iridescence_texture,
-            &self.iridescence_thickness_texture,
-            &self.clearcoat_texture,
-            &self.clearcoat_roughness_texture,
-            &self.clearcoat_ior_texture,
-            &self.clearcoat_color_texture,
-            &self.sheen_color_texture,
-            &self.sheen_roughness_texture,
-        ];
-        textures.iter().all(|texture| texture.is_none())
     }
 
     /// The parameters of the scattering model at a surface point. `eta` is the index of refraction behind the surface
@@ -104,57 +75,41 @@ impl Material {
         let (base_color, metallic, transmission) = self.base_and_shares(surface, textures);
         let mut p = Parameters {
             base_color,
-            diffuse_roughness: unit(self.diffuse_roughness),
+            diffuse_roughness: self.diffuse_roughness.at(surface, textures),
             metallic,
             eta,
             transmission,
             thin: self.thin,
-            specular: unit(self.specular),
-            specular_color: self.specular_color.max(Rgb::ZERO),
+            specular: self.specular.at(surface, textures),
+            specular_color: self.specular_color.factor.max(Rgb::ZERO),
             ..Parameters::default()
         };
-        if p.diffuse_roughness > 0.0 && self.diffuse_roughness_texture.is_some() {
-            p.diffuse_roughness *= unit(look_up(&self.diffuse_roughness_texture, surface, textures).x);
-        }
-        let mut roughness = unit(self.roughness);
-        if self.metallic_roughness_texture.is_some() {
-            roughness *= unit(look_up(&self.metallic_roughness_texture, surface, textures).y);
-        }
-        let alpha = sqr(roughness);
+        let alpha = sqr(self.roughness.at(surface, textures));
         (p.alpha_x, p.alpha_y) = (alpha, alpha);
         if self.anisotropy != 0.0 {
             // KHR_materials_anisotropy: alpha along the direction is a mix of alpha and 1.
             let texel = look_up(&self.anisotropy_texture, surface, textures);
             p.alpha_x = alpha + (1.0 - alpha) * sqr(unit(self.anisotropy * texel.z));
         }
-        if self.specular_texture.is_some() {
-            p.specular *= unit(look_up(&self.specular_texture, surface, textures).w);
+        if self.specular_color.texture.is_some() {
+            p.specular_color *= self.specular_color.texel(surface, textures).truncate().max(Rgb::ZERO);
         }
-        if self.specular_color_texture.is_some() {
-            let texel = look_up(&self.specular_color_texture, surface, textures);
-            p.specular_color *= texel.truncate().max(Rgb::ZERO);
+        if self.diffuse_transmission.factor > 0.0 {
+            p.diffuse_transmission = self.diffuse_transmission.at(surface, textures);
+            p.diffuse_transmission_color = self.diffuse_transmission_color.at(surface, textures);
         }
-        if self.diffuse_transmission > 0.0 {
-            let texel = look_up(&self.diffuse_transmission_texture, surface, textures);
-            p.diffuse_transmission = unit(self.diffuse_transmission) * unit(texel.w);
-            let texel = look_up(&self.diffuse_transmission_color_texture, surface, textures);
-            p.diffuse_transmission_color = unit_color(self.diffuse_transmission_color) * unit_color(texel.truncate());
-        }
-        if self.iridescence > 0.0 {
+        if self.iridescence.factor > 0.0 {
             self.thin_film(&mut p, surface, textures);
         }
-        if self.clearcoat > 0.0 {
+        if self.clearcoat.factor > 0.0 {
             p.clearcoat = self.coat(surface, textures);
-            let texel = look_up(&self.clearcoat_roughness_texture, surface, textures);
-            p.clearcoat_alpha = sqr(unit(self.clearcoat_roughness) * unit(texel.y));
+            p.clearcoat_alpha = sqr(self.clearcoat_roughness.at(surface, textures));
             p.clearcoat_eta = self.coat_ior(surface, textures);
-            p.clearcoat_color = self.coat_color(surface, textures);
+            p.clearcoat_color = self.clearcoat_color.at(surface, textures);
         }
-        if self.sheen_color.max_element() > 0.0 {
-            let texel = look_up(&self.sheen_color_texture, surface, textures);
-            p.sheen_color = unit_color(self.sheen_color) * unit_color(texel.truncate());
-            let texel = look_up(&self.sheen_roughness_texture, surface, textures);
-            p.sheen_alpha = sqr(unit(self.sheen_roughness) * unit(texel.w));
+        if self.sheen_color.factor.max_element() > 0.0 {
+            p.sheen_color = self.sheen_color.at(surface, textures);
+            p.sheen_alpha = sqr(self.sheen_roughness.at(surface, textures));
             p.sheen_model = self.sheen_model;
         }
         p
@@ -162,11 +117,11 @@ impl Material {
 
     /// Sets the thin film in the parameters of the scattering model, whose relative index is set.
     fn thin_film(&self, p: &mut Parameters, surface: &Surface, textures: &[Texture]) {
-        p.film = unit(self.iridescence) * unit(look_up(&self.iridescence_texture, surface, textures).x);
+        p.film = self.iridescence.at(surface, textures);
         let around = if self.ior.is_finite() { self.ior / p.eta } else { 1.0 };
         p.film_eta = self.iridescence_ior / around;
-        let [thin, thick] = self.iridescence_thickness;
-        let share = unit(look_up(&self.iridescence_thickness_texture, surface, textures).y);
+        let [thin, thick] = self.iridescence_thickness.factor;
+        let share = unit(self.iridescence_thickness.texel(surface, textures).y);
         p.film_path = 2.0 * self.iridescence_ior * (thin + (thick - thin) * share).max(0.0);
     }
 
@@ -204,33 +159,23 @@ impl Material {
     /// Strength of the clear coat at a surface point, 0 to 1.
     #[inline]
     pub fn coat(&self, surface: &Surface, textures: &[Texture]) -> f32 {
-        unit(self.clearcoat) * unit(look_up(&self.clearcoat_texture, surface, textures).x)
+        self.clearcoat.at(surface, textures)
     }
 
     /// Index of refraction of the clear coat at a surface point, at least 1.
     #[inline]
     pub fn coat_ior(&self, surface: &Surface, textures: &[Texture]) -> f32 {
-        match self.clearcoat_ior_texture {
-            None => self.clearcoat_ior,
-            texture => 1.0 + (self.clearcoat_ior - 1.0) * unit(look_up(&texture, surface, textures).x),
-        }
-    }
-
-    /// Colour of the clear coat at a surface point, each channel 0 to 1.
-    #[inline]
-    fn coat_color(&self, surface: &Surface, textures: &[Texture]) -> Rgb {
-        let color = unit_color(self.clearcoat_color);
-        match self.clearcoat_color_texture {
-            None => color,
-            texture => color * unit_color(look_up(&texture, surface, textures).truncate()),
+        match self.clearcoat_ior.texture {
+            None => self.clearcoat_ior.factor,
+            Some(_) => 1.0 + (self.clearcoat_ior.factor - 1.0) * unit(self.clearcoat_ior.texel(surface, textures).x),
         }
     }
 
     /// Whether textures change the tint that the clear coat gives to the emission below it, which the emission itself
     /// does not include then.
     pub fn has_textured_tint(&self) -> bool {
-        let by_path = self.clearcoat_ior_texture.is_some() && self.clearcoat_color != Rgb::ONE;
-        self.clearcoat > 0.0 && (self.clearcoat_color_texture.is_some() || by_path)
+        let by_path = self.clearcoat_ior.texture.is_some() && self.clearcoat_color.factor != Rgb::ONE;
+        self.clearcoat.factor > 0.0 && (self.clearcoat_color.texture.is_some() || by_path)
     }
 
     /// Whether the radiance that surfaces emit varies with textures.
@@ -249,7 +194,8 @@ impl Material {
     /// applies at each point.
     pub fn tint_emission(&mut self) {
         if !self.has_textured_tint() {
-            self.emission *= Material::coat_tint(self.clearcoat, self.clearcoat_ior, self.clearcoat_color);
+            self.emission *=
+                Material::coat_tint(self.clearcoat.factor, self.clearcoat_ior.factor, self.clearcoat_color.factor);
         }
     }
 
@@ -266,7 +212,7 @@ impl Material {
         if !self.has_textured_tint() {
             return emitted;
         }
-        let (ior, color) = (self.coat_ior(surface, textures), self.coat_color(surface, textures));
+        let (ior, color) = (self.coat_ior(surface, textures), self.clearcoat_color.at(surface, textures));
         emitted * Material::coat_tint(self.coat(surface, textures), ior, color)
     }
 }

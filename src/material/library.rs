@@ -4,7 +4,7 @@ use super::{Alpha, Material};
 use crate::bsdf::{DELTA_ALPHA, refraction_width};
 use crate::geometry::Surface;
 use crate::math::Rgb;
-use crate::texture::{Texture, TextureRef};
+use crate::texture::Texture;
 use std::sync::Arc;
 
 /// Perceptual roughness from which on a lobe is too wide to focus light into caustics or to show reflections.
@@ -22,36 +22,6 @@ pub struct Materials {
 /// Whether a lobe of this perceptual roughness is a delta lobe: a perfect mirror or clear interface.
 fn is_perfect(roughness: f32) -> bool {
     roughness * roughness < DELTA_ALPHA
-}
-
-/// References to all textures of a material, by `as_ref` or `as_mut`.
-macro_rules! textures {
-    ($material:ident, $reference:ident) => {
-        [
-            $material.base_color_texture.$reference(),
-            $material.diffuse_roughness_texture.$reference(),
-            $material.metallic_roughness_texture.$reference(),
-            $material.normal_texture.$reference().map(|(texture, _)| texture),
-            $material.emission_texture.$reference(),
-            $material.transmission_texture.$reference(),
-            $material.diffuse_transmission_texture.$reference(),
-            $material.diffuse_transmission_color_texture.$reference(),
-            $material.specular_texture.$reference(),
-            $material.specular_color_texture.$reference(),
-            $material.iridescence_texture.$reference(),
-            $material.iridescence_thickness_texture.$reference(),
-            $material.clearcoat_texture.$reference(),
-            $material.clearcoat_roughness_texture.$reference(),
-            $material.clearcoat_ior_texture.$reference(),
-            $material.clearcoat_color_texture.$reference(),
-            $material.clearcoat_normal_texture.$reference().map(|(texture, _)| texture),
-            $material.sheen_color_texture.$reference(),
-            $material.sheen_roughness_texture.$reference(),
-            $material.anisotropy_texture.$reference(),
-        ]
-        .into_iter()
-        .flatten()
-    };
 }
 
 impl Material {
@@ -90,7 +60,7 @@ impl Material {
     /// Whether surfaces of this material may transmit light.
     #[inline]
     pub fn transmits(&self) -> bool {
-        self.transmission > 0.0 || self.diffuse_transmission > 0.0
+        self.transmission.factor > 0.0 || self.diffuse_transmission.factor > 0.0
     }
 
     /// Whether a mesh of this material is the boundary of a solid that light enters: of glass, or of a body whose
@@ -101,69 +71,60 @@ impl Material {
 
     /// Whether the base, without coats, may have a narrow lobe (delta or sharp).
     fn has_narrow_base(&self) -> bool {
-        self.is_narrow() || self.metallic_roughness_texture.is_some()
+        self.is_narrow() || self.roughness.texture.is_some()
     }
 
     /// Whether the lobe of the base is narrow (delta or sharp) everywhere: a texture can only make it narrower.
     fn is_narrow(&self) -> bool {
-        let glass = self.transmission > 0.0 && !self.thin;
+        let glass = self.transmission.factor > 0.0 && !self.thin;
         let width = if glass { refraction_width(self.ior) } else { 1.0 };
-        self.roughness * width.sqrt() < MAX_FOCUSING_ROUGHNESS
+        self.roughness.factor * width.sqrt() < MAX_FOCUSING_ROUGHNESS
     }
 
     /// Whether the material is glass or a mirror, perfect or slightly rough, everywhere: it shows what is behind it or in
     /// front of it.
     pub fn is_smooth(&self) -> bool {
-        let glass = self.transmission >= 0.5 && self.transmission_texture.is_none();
-        let metal = self.metallic >= 0.5 && self.metallic_roughness_texture.is_none();
+        let glass = self.transmission.factor >= 0.5 && self.transmission.texture.is_none();
+        let metal = self.metallic.factor >= 0.5 && self.metallic.texture.is_none();
         self.is_narrow() && (glass || metal)
     }
 
     /// Whether the material shows reflections: its base or its clear coat may have a narrow lobe (delta or sharp).
     pub fn is_glossy(&self) -> bool {
-        self.has_narrow_base() || self.clearcoat > 0.0
+        self.has_narrow_base() || self.clearcoat.factor > 0.0
     }
 
     /// Whether the base or the clear coat may have a delta lobe, and whether one of them may have a narrow lobe that is
     /// not a delta lobe.
     pub fn perfect_and_sharp(&self) -> (bool, bool) {
-        let base = (self.roughness, self.metallic_roughness_texture.is_some());
-        let coat = (self.clearcoat_roughness, self.clearcoat_roughness_texture.is_some());
-        let lobes = [Some(base), (self.clearcoat > 0.0).then_some(coat)];
+        let base = (self.roughness.factor, self.roughness.texture.is_some());
+        let coat = (self.clearcoat_roughness.factor, self.clearcoat_roughness.texture.is_some());
+        let lobes = [Some(base), (self.clearcoat.factor > 0.0).then_some(coat)];
         let any =
             |of: &dyn Fn(f32) -> bool| lobes.iter().flatten().any(|&(roughness, textured)| textured || of(roughness));
         let sharp = any(&|roughness| !is_perfect(roughness) && roughness < MAX_FOCUSING_ROUGHNESS);
-        (any(&is_perfect), sharp || (self.has_narrow_base() && !is_perfect(self.roughness)))
+        (any(&is_perfect), sharp || (self.has_narrow_base() && !is_perfect(self.roughness.factor)))
     }
 
     /// Whether the material is only a perfect mirror or clear glass, which shows other surfaces but no light that falls
     /// on itself.
     pub fn is_clear(&self) -> bool {
-        let perfect = is_perfect(self.roughness) && self.metallic_roughness_texture.is_none();
-        let glass = self.transmission == 1.0 && self.transmission_texture.is_none() && self.metallic == 0.0;
-        let covered = self.clearcoat > 0.0 || self.sheen_color != Rgb::ZERO;
-        perfect && (glass || self.metallic == 1.0) && !covered
+        let perfect = is_perfect(self.roughness.factor) && self.roughness.texture.is_none();
+        let glass =
+            self.transmission.factor == 1.0 && self.transmission.texture.is_none() && self.metallic.factor == 0.0;
+        let covered = self.clearcoat.factor > 0.0 || self.sheen_color.factor != Rgb::ZERO;
+        perfect && (glass || self.metallic.factor == 1.0) && !covered
     }
 
     /// Whether the material makes visible caustics: a mirror or glass with a narrow lobe.
     pub fn focuses(&self) -> bool {
-        self.has_narrow_base() && (self.transmission > 0.0 || self.metallic >= 0.5)
-    }
-
-    /// References to the textures that the material uses.
-    pub fn textures(&self) -> impl Iterator<Item = TextureRef> {
-        textures!(self, as_ref).copied()
-    }
-
-    /// The references to textures, to change them.
-    pub fn textures_mut(&mut self) -> impl Iterator<Item = &mut TextureRef> {
-        textures!(self, as_mut)
+        self.has_narrow_base() && (self.transmission.factor > 0.0 || self.metallic.factor >= 0.5)
     }
 
     /// Whether the material fills a solid whose index of refraction depends on the wavelength.
     #[inline]
     pub fn disperses(&self) -> bool {
-        self.dispersion > 0.0 && self.ior > 1.0 && self.ior.is_finite() && self.transmission > 0.0 && !self.thin
+        self.dispersion > 0.0 && self.ior > 1.0 && self.ior.is_finite() && self.transmission.factor > 0.0 && !self.thin
     }
 
     /// Index of refraction of a dispersive material at a wavelength (nm): Cauchy's equation through the lines of the

@@ -83,8 +83,8 @@ fn coat_indices(material: &Material) -> impl Iterator<Item = f32> {
     /// Largest step of the index, and of steps.
     const STEP: f32 = 0.02;
     const MAX_STEPS: f32 = 200.0;
-    let above = material.clearcoat_ior - 1.0;
-    let steps = match material.clearcoat_ior_texture {
+    let above = material.clearcoat_ior.factor - 1.0;
+    let steps = match material.clearcoat_ior.texture {
         Some(_) => (above / STEP).ceil().clamp(1.0, MAX_STEPS),
         None => 1.0,
     };
@@ -97,7 +97,7 @@ impl EnergyTables {
     pub fn for_materials(materials: &[Material]) -> EnergyTables {
         let (open, around) = (distinct(materials.iter().map(|m| m.ior)), solids(materials));
         let nested = open.iter().flat_map(|ior| around.iter().map(move |n| ior / n));
-        let coats = distinct(materials.iter().filter(|m| m.clearcoat > 0.0).flat_map(coat_indices));
+        let coats = distinct(materials.iter().filter(|m| m.clearcoat.factor > 0.0).flat_map(coat_indices));
         EnergyTables::new(open.iter().copied().chain(nested).chain(coats))
     }
 }

@@ -27,7 +27,7 @@ impl Presence {
         let focuses = |used: &&UsedMaterial| used.material.focuses();
         let caustic = |used: &UsedMaterial| format!("{} {under}", used.label());
         let seen = |used: &UsedMaterial| {
-            let how = if used.material.transmission > 0.0 { "through" } else { "in" };
+            let how = if used.material.transmission.factor > 0.0 { "through" } else { "in" };
             format!("caustics seen {how} {}", used.label())
         };
         let environment = scene.lights.sky().environment.is_some();

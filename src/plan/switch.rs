@@ -5,7 +5,7 @@ use super::names::{truncate_reasons, used_materials};
 use super::presence::{ENVIRONMENT, SPACE, material_reasons};
 use crate::error::Result;
 use crate::material::{Alpha, Material, Materials};
-use crate::math::{Rgb, Vec4};
+use crate::math::Vec4;
 use crate::path_class::{Effect, EffectSet};
 use crate::scene::{Description, Scene};
 use crate::texture::{Integers, Texels, Texture, TextureRef};
@@ -104,11 +104,8 @@ fn flatten_textures(materials: &mut [Material], textures: &[Texture]) -> Vec<Tex
             kept.push(mask_of(texture));
             TextureRef { texture: kept.len() as u32 - 1, ..reference }
         });
-        flatten_material(
-            material,
-            |reference| means.get(reference.texture as usize).copied().unwrap_or(Vec4::ONE),
-            mask.is_some(),
-        );
+        let mean = |reference: TextureRef| means.get(reference.texture as usize).copied().unwrap_or(Vec4::ONE);
+        material.flatten(mean, mask.is_some());
         material.base_color_texture = mask;
     }
     kept
@@ -132,53 +129,4 @@ fn mask_of(texture: &Texture) -> Texture {
         Texels::Floats(data) => Texels::Floats(data.iter().map(|texel| [1.0, 1.0, 1.0, texel[3]]).collect()),
     };
     Texture { name: texture.name.clone(), texels, ..*texture }
-}
-
-/// Multiplies the factors of a material by the means of their textures and removes the textures. `keep_alpha`: the base
-/// colour's alpha does not change, because its texture stays.
-fn flatten_material(material: &mut Material, mean: impl Fn(TextureRef) -> Vec4, keep_alpha: bool) {
-    let take = |texture: &mut Option<TextureRef>| texture.take().map_or(Vec4::ONE, &mean);
-    let mut base = take(&mut material.base_color_texture);
-    if keep_alpha {
-        base.w = 1.0;
-    }
-    material.base_color = (Vec4::from_array(material.base_color) * base).to_array();
-    material.diffuse_roughness *= take(&mut material.diffuse_roughness_texture).x;
-    let metallic_roughness = take(&mut material.metallic_roughness_texture);
-    material.roughness *= metallic_roughness.y;
-    material.metallic *= metallic_roughness.z;
-    // The mean of a normal map is the surface's normal.
-    material.normal_texture = None;
-    material.clearcoat_normal_texture = None;
-    let color = |factor: Rgb, texel: Vec4| factor * texel.truncate();
-    material.emission = color(material.emission, take(&mut material.emission_texture));
-    material.transmission *= take(&mut material.transmission_texture).x;
-    material.diffuse_transmission *= take(&mut material.diffuse_transmission_texture).w;
-    material.diffuse_transmission_color =
-        color(material.diffuse_transmission_color, take(&mut material.diffuse_transmission_color_texture));
-    material.specular *= take(&mut material.specular_texture).w;
-    material.specular_color = color(material.specular_color, take(&mut material.specular_color_texture));
-    material.iridescence *= take(&mut material.iridescence_texture).x;
-    let [thin, thick] = material.iridescence_thickness;
-    let share = take(&mut material.iridescence_thickness_texture).y;
-    material.iridescence_thickness = [thin + (thick - thin) * share; 2];
-    let tinted = material.has_textured_tint();
-    material.clearcoat *= take(&mut material.clearcoat_texture).x;
-    if material.clearcoat_ior_texture.is_some() {
-        material.clearcoat_ior = 1.0 + (material.clearcoat_ior - 1.0) * take(&mut material.clearcoat_ior_texture).x;
-    }
-    if material.clearcoat_color_texture.is_some() {
-        material.clearcoat_color = color(material.clearcoat_color, take(&mut material.clearcoat_color_texture));
-    }
-    if tinted {
-        material.tint_emission();
-    }
-    material.clearcoat_roughness *= take(&mut material.clearcoat_roughness_texture).y;
-    material.sheen_color = color(material.sheen_color, take(&mut material.sheen_color_texture));
-    material.sheen_roughness *= take(&mut material.sheen_roughness_texture).w;
-    if material.anisotropy_texture.is_some() {
-        let texel = take(&mut material.anisotropy_texture);
-        material.anisotropy *= texel.z;
-        material.anisotropy_rotation += (2.0 * texel.y - 1.0).atan2(2.0 * texel.x - 1.0);
-    }
 }

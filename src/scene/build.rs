@@ -531,8 +531,8 @@ pub(super) fn add_light_spheres(description: &mut Description) {
         let material = Material {
             name: light.name.clone(),
             base_color: [0.0, 0.0, 0.0, 1.0],
-            metallic: 0.0,
-            specular: 0.0,
+            metallic: 0.0.into(),
+            specular: 0.0.into(),
             emission,
             null_bsdf: light.pass_through || dark,
             ..Material::default()

@@ -121,8 +121,8 @@ fn add_floor(description: &mut Description) {
         description.materials.push(Material {
             name: mesh.name.clone(),
             base_color: [REFLECTANCE, REFLECTANCE, REFLECTANCE, 1.0],
-            metallic: 0.0,
-            specular: 0.0,
+            metallic: 0.0.into(),
+            specular: 0.0.into(),
             alpha,
             culled: true,
             ..Material::default()

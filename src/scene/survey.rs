@@ -78,7 +78,7 @@ impl Survey {
             }
             survey.culled |= material.culled;
             survey.alpha |= material.alpha != Alpha::Opaque;
-            survey.narrow_lobes |= material.is_glossy() || material.transmission > 0.0;
+            survey.narrow_lobes |= material.is_glossy() || material.transmission.factor > 0.0;
             let lobes = material.perfect_and_sharp();
             (perfect, sharp) = (perfect | lobes.0, sharp | lobes.1);
             if material.is_solid() {
@@ -88,7 +88,7 @@ impl Survey {
                 survey.fire |= material.medium_emission().is_some();
                 let scatters = scatters(&material.medium);
                 survey.scattering |= scatters;
-                survey.cloudy_glass |= scatters && material.transmission > 0.0 && material.ior != 1.0 && lobes.0;
+                survey.cloudy_glass |= scatters && material.transmission.factor > 0.0 && material.ior != 1.0 && lobes.0;
                 survey.null_boundaries |= material.ior == 1.0 || material.has_alpha_per_entry();
                 survey.dispersion |= material.disperses();
             }

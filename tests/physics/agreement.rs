@@ -102,10 +102,20 @@ fn glossy_room() {
 #[test]
 #[ignore = "long"]
 fn lamp_behind_glass_in_a_varnished_room() {
-    let varnish = Material { base_color: [0.5, 0.4, 0.3, 1.0], metallic: 0.0, roughness: 0.35, ..Material::default() };
+    let varnish = Material {
+        base_color: [0.5, 0.4, 0.3, 1.0],
+        metallic: 0.0.into(),
+        roughness: 0.35.into(),
+        ..Material::default()
+    };
     let mut description = lit_room(varnish);
     add(&mut description, "pane", cuboid(Vec3::new(-0.6, 1.8, -0.6), Vec3::new(0.6, 1.9, 0.6), false), glass(1.5));
-    let metal = Material { base_color: [0.9, 0.7, 0.4, 1.0], metallic: 1.0, roughness: 0.3, ..Material::default() };
+    let metal = Material {
+        base_color: [0.9, 0.7, 0.4, 1.0],
+        metallic: 1.0.into(),
+        roughness: 0.3.into(),
+        ..Material::default()
+    };
     add(&mut description, "metal", sphere(Vec3::new(0.3, 0.5, 0.0), 0.5, 64), metal);
     let scene = build(description);
     let paths = by_paths(&scene, 256, 10);
@@ -119,7 +129,7 @@ fn lamp_behind_glass_in_a_varnished_room() {
 fn glass_room() {
     let mut description = lit_room(matte(0.5, 0.0));
     add(&mut description, "smooth", sphere(Vec3::new(-0.45, 0.45, 0.0), 0.4, 128), glass(1.5));
-    let rough = Material { roughness: 0.4, ..glass(1.4) };
+    let rough = Material { roughness: 0.4.into(), ..glass(1.4) };
     add(&mut description, "rough", sphere(Vec3::new(0.45, 0.45, 0.3), 0.4, 64), rough);
     let scene = build(description);
     let paths = by_paths(&scene, 128, 10);

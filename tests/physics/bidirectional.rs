@@ -291,7 +291,7 @@ fn glossy_room() {
 fn glass_room() {
     let mut description = lit_room(matte(0.5, 0.0));
     add(&mut description, "smooth", sphere(Vec3::new(-0.45, 0.45, 0.0), 0.4, 128), glass(1.5));
-    let rough = Material { roughness: 0.4, ..glass(1.4) };
+    let rough = Material { roughness: 0.4.into(), ..glass(1.4) };
     add(&mut description, "rough", sphere(Vec3::new(0.45, 0.45, 0.3), 0.4, 64), rough);
     description.cameras[0].aperture_radius = 0.05;
     description.cameras[0].focus_distance = 2.5;
@@ -310,7 +310,7 @@ fn under_the_sky() {
     let block = cuboid(Vec3::new(-0.6, 0.0, -0.6), Vec3::new(-0.1, 0.7, -0.1), false);
     add(&mut description, "block", block, matte(0.6, 0.0));
     // Narrow enough for aimed light paths.
-    let metal = Material { metallic: 1.0, roughness: 0.4, ..Material::default() };
+    let metal = Material { metallic: 1.0.into(), roughness: 0.4.into(), ..Material::default() };
     add(&mut description, "ball", sphere(Vec3::new(0.4, 0.35, 0.1), 0.35, 64), metal);
     let (width, height) = (32, 16);
     let mut texels = vec![[0.3, 0.4, 0.6]; (width * height) as usize];

@@ -159,7 +159,7 @@ fn stacks_of_blocks_add_no_light() {
     // Shadow rays connect to rough glass from outside and from inside, so they cross coinciding surfaces.
     let rough = stack(Box::new(move |d| {
         for (k, ior) in [1.3, 1.5, 1.8].into_iter().enumerate() {
-            add(d, "block", block(k as i32), Material { roughness: 0.3, ..glass(ior) });
+            add(d, "block", block(k as i32), Material { roughness: 0.3.into(), ..glass(ior) });
         }
     }));
     is_white("three rough glasses", &rough, &METHODS);
@@ -247,7 +247,7 @@ fn block_on(table: Material, gap: f32, optical_contact: bool) -> Scene {
 /// was no total internal reflection at its foot.
 #[test]
 fn a_glass_on_a_table_looks_like_one_just_above_it() {
-    let metal = Material { base_color: [0.7, 0.7, 0.7, 1.0], roughness: 0.4, ..mirror() };
+    let metal = Material { base_color: [0.7, 0.7, 0.7, 1.0], roughness: 0.4.into(), ..mirror() };
     for (what, table) in [("matte table", matte(0.6, 0.0)), ("metal table", metal)] {
         let of = |gap, optical| block_on(table.clone(), gap, optical);
         look_alike(what, &[of(0.0, false), of(1e-3, false), of(1e-4, false), of(0.0, true)], &METHODS);
@@ -263,7 +263,7 @@ fn a_lamp_that_touches_a_glass_shines_like_one_just_below_it() {
         let lamp = quad(Vec3::new(-0.6, 0.0, -0.6), Vec3::Z * 1.2, Vec3::X * 1.2);
         add(&mut description, "lamp", lamp, matte(0.3, 5.0));
         let block = cuboid(Vec3::new(-1.0, gap, -1.0), Vec3::new(1.0, 1.0 + gap, 1.0), false);
-        let rough = Material { roughness: 0.3, optical_contact, ..glass(1.5) };
+        let rough = Material { roughness: 0.3.into(), optical_contact, ..glass(1.5) };
         add(&mut description, "block", block, rough);
         description.cameras.push(look_at(DVec3::new(0.5, 1.3, 5.0), DVec3::new(0.0, 0.6, 0.0), 30.0));
         build(description)

@@ -574,7 +574,7 @@ fn rough_dispersive_glass_agrees() {
     add(&mut description, "lamp", lamp, matte(0.0, 8.0));
     for (x, roughness) in [(-0.45, 0.25), (0.45, 0.6)] {
         let ball = sphere(Vec3::new(x, 0.45, 0.2), 0.4, 64);
-        add(&mut description, "ball", ball, Material { roughness, ..dispersive(1.5, 6.0) });
+        add(&mut description, "ball", ball, Material { roughness: roughness.into(), ..dispersive(1.5, 6.0) });
     }
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 2.8), DVec3::new(0.0, 0.9, 0.0), 50.0));
     let scene = build(description);
@@ -595,7 +595,7 @@ fn furnace() {
     for roughness in [0.0, 0.5] {
         let mut description = Description::default();
         let ball = sphere(Vec3::ZERO, 1.0, 64);
-        add(&mut description, "ball", ball, Material { roughness, ..dispersive(1.7, 5.0) });
+        add(&mut description, "ball", ball, Material { roughness: roughness.into(), ..dispersive(1.7, 5.0) });
         let source = EnvironmentSource::Color(Rgb::ONE);
         description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
         description.cameras.push(look_at(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, 36.0));

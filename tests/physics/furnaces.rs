@@ -8,7 +8,7 @@
 
 use crate::support;
 
-use caustique::material::Material;
+use caustique::material::{Input, Material};
 use caustique::math::{DVec3, Rgb, Vec2, Vec3, Vec4};
 use caustique::render::InitialBandwidth;
 use caustique::render::{Control, Method, Settings, render};
@@ -43,28 +43,36 @@ fn white_sky() -> Description {
 
 /// Materials of all kinds that lose no energy.
 fn white() -> Vec<(&'static str, Material)> {
-    let shell = |roughness: f32| Material { roughness, thin: true, transmission: 1.0, ..matte(1.0, 0.0) };
-    let plastic = |roughness: f32| Material { roughness, specular: 1.0, ..matte(1.0, 0.0) };
-    let metal = |roughness: f32| Material { roughness, metallic: 1.0, ..matte(1.0, 0.0) };
+    let shell = |roughness: f32| Material {
+        roughness: roughness.into(),
+        thin: true,
+        transmission: 1.0.into(),
+        ..matte(1.0, 0.0)
+    };
+    let plastic = |roughness: f32| Material { roughness: roughness.into(), specular: 1.0.into(), ..matte(1.0, 0.0) };
+    let metal = |roughness: f32| Material { roughness: roughness.into(), metallic: 1.0.into(), ..matte(1.0, 0.0) };
     vec![
         ("matte", matte(1.0, 0.0)),
-        ("rough matte", Material { diffuse_roughness: 1.0, ..matte(1.0, 0.0) }),
+        ("rough matte", Material { diffuse_roughness: 1.0.into(), ..matte(1.0, 0.0) }),
         ("mirror", mirror()),
         ("rough metal", metal(0.6)),
         ("brushed metal", Material { anisotropy: 0.8, ..metal(0.5) }),
         ("smooth plastic", plastic(0.0)),
         ("plastic", plastic(0.4)),
-        ("metal with a thin film", Material { iridescence: 1.0, ..metal(0.4) }),
-        ("soap bubble", Material { iridescence: 1.0, iridescence_ior: 1.33, ior: 1.0, ..shell(0.0) }),
+        ("metal with a thin film", Material { iridescence: 1.0.into(), ..metal(0.4) }),
+        ("soap bubble", Material { iridescence: 1.0.into(), iridescence_ior: 1.33, ior: 1.0, ..shell(0.0) }),
         ("clear glass", glass(1.5)),
-        ("frosted glass", Material { roughness: 0.5, ..glass(1.5) }),
+        ("frosted glass", Material { roughness: 0.5.into(), ..glass(1.5) }),
         ("dispersing glass", Material { dispersion: 0.5, ..glass(1.6) }),
         ("film", shell(0.0)),
         ("frosted film", shell(0.6)),
-        ("paper", Material { diffuse_transmission: 0.4, double_sided: true, ..plastic(0.5) }),
-        ("below a coat", Material { clearcoat: 1.0, clearcoat_roughness: 0.2, ..matte(1.0, 0.0) }),
-        ("below sheen", Material { sheen_color: Rgb::splat(0.7), sheen_roughness: 0.5, ..matte(1.0, 0.0) }),
-        ("half of all", Material { metallic: 0.5, transmission: 0.5, ..plastic(0.4) }),
+        ("paper", Material { diffuse_transmission: 0.4.into(), double_sided: true, ..plastic(0.5) }),
+        ("below a coat", Material { clearcoat: 1.0.into(), clearcoat_roughness: 0.2.into(), ..matte(1.0, 0.0) }),
+        (
+            "below sheen",
+            Material { sheen_color: Rgb::splat(0.7).into(), sheen_roughness: 0.5.into(), ..matte(1.0, 0.0) },
+        ),
+        ("half of all", Material { metallic: 0.5.into(), transmission: 0.5.into(), ..plastic(0.4) }),
     ]
 }
 
@@ -142,13 +150,11 @@ fn textured_coats_look_the_same_by_all_methods() {
     description.textures = vec![Texture { name: "spots".into(), width: 2, height: 2, texels, wrap, linear: true }];
     let spots = TextureRef { texture: 0, set: 0, transform: [[4.0, 0.0, 0.0], [0.0, 4.0, 0.0]] };
     let material = Material {
-        diffuse_roughness: 1.0,
-        diffuse_roughness_texture: Some(spots),
-        clearcoat: 0.8,
-        clearcoat_roughness: 0.6,
-        clearcoat_ior: 1.8,
-        clearcoat_ior_texture: Some(spots),
-        clearcoat_color_texture: Some(spots),
+        diffuse_roughness: Input { factor: 1.0, texture: Some(spots) },
+        clearcoat: 0.8.into(),
+        clearcoat_roughness: 0.6.into(),
+        clearcoat_ior: Input { factor: 1.8, texture: Some(spots) },
+        clearcoat_color: Input { factor: Rgb::ONE, texture: Some(spots) },
         ..matte(0.8, 0.0)
     };
     let mut floor = quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0);

@@ -26,7 +26,8 @@ const DETECTS: f64 = 0.1;
 fn furnace(roughness: f32) -> Scene {
     let mut description = Description::default();
     add(&mut description, "room", cuboid(Vec3::ZERO, Vec3::new(4.0, 2.0, 4.0), true), matte(0.5, 0.5));
-    let metal = Material { base_color: [1.0; 4], metallic: 1.0, roughness, ..Material::default() };
+    let metal =
+        Material { base_color: [1.0; 4], metallic: 1.0.into(), roughness: roughness.into(), ..Material::default() };
     add(&mut description, "floor", cuboid(Vec3::new(0.02, 0.01, 0.02), Vec3::new(3.98, 0.02, 3.98), false), metal);
     add(&mut description, "pane", cuboid(Vec3::new(0.01, 0.2, 0.01), Vec3::new(3.99, 0.25, 3.99), false), glass(1.5));
     description.cameras.push(look_at(DVec3::new(2.0, 1.0, 2.8), DVec3::new(2.0, 0.0, 1.8), 12.0));
@@ -100,7 +101,7 @@ fn check_furnaces(furnaces: &[(f32, f32)]) {
 fn ball() -> Scene {
     let mut description = Description::default();
     add(&mut description, "room", cuboid(Vec3::ZERO, Vec3::new(4.0, 2.0, 4.0), true), matte(0.5, 0.5));
-    let metal = Material { base_color: [1.0; 4], metallic: 1.0, roughness: 0.3, ..Material::default() };
+    let metal = Material { base_color: [1.0; 4], metallic: 1.0.into(), roughness: 0.3.into(), ..Material::default() };
     add(&mut description, "ball", sphere(Vec3::new(2.0, 0.1, 2.0), BALL, 64), metal);
     add(&mut description, "pane", cuboid(Vec3::new(0.01, 0.2, 0.01), Vec3::new(3.99, 0.25, 3.99), false), glass(1.5));
     description.cameras.push(look_at(DVec3::new(2.0, 1.0, 2.8), DVec3::new(2.0, 0.1, 2.0), 4.0));
@@ -149,7 +150,7 @@ fn bandwidths_shrink_on_metal() {
 /// most iterations.
 fn pane() -> Scene {
     let mut description = Description::default();
-    let metal = Material { base_color: [1.0; 4], metallic: 1.0, roughness: 0.35, ..Material::default() };
+    let metal = Material { base_color: [1.0; 4], metallic: 1.0.into(), roughness: 0.35.into(), ..Material::default() };
     let lamp = quad(Vec3::new(-0.05, 3.0, -0.05), Vec3::new(0.1, 0.0, 0.0), Vec3::new(0.0, 0.0, 0.1));
     add(&mut description, "lamp", lamp, matte(0.0, 100.0));
     add(&mut description, "metal", cuboid(Vec3::new(-0.3, -0.1, -0.3), Vec3::new(0.3, 0.0, 0.3), false), metal);

@@ -95,7 +95,7 @@ fn furnaces() -> Vec<Case> {
                 d,
                 "plastic",
                 sphere(Vec3::ZERO, 0.3, 32),
-                Material { specular: 1.0, roughness: 0.4, ..matte(1.0, 0.0) },
+                Material { specular: 1.0.into(), roughness: 0.4.into(), ..matte(1.0, 0.0) },
             );
             hide(d, cuboid(Vec3::new(-0.6, -0.6, -0.6), Vec3::new(0.6, 0.0, 0.6), false), glass(1.33));
         }),

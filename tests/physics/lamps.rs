@@ -397,7 +397,7 @@ fn all_methods_agree_on_bulbs_of_spots() {
     description.materials[1].emission = Rgb::ZERO;
     description.materials[1].null_bsdf = true;
     description.materials[0] =
-        Material { name: "room".into(), clearcoat: 1.0, clearcoat_roughness: 0.0, ..matte(0.5, 0.0) };
+        Material { name: "room".into(), clearcoat: 1.0.into(), clearcoat_roughness: 0.0.into(), ..matte(0.5, 0.0) };
     description.lights.push(PunctualLight {
         to_world: caustique::math::DAffine3::from_translation(DVec3::new(0.2, 1.6, 0.2))
             * caustique::math::DAffine3::from_quat(glam::DQuat::from_rotation_x(-PI / 2.0)),

@@ -35,15 +35,15 @@ fn random_material(seed: u64) -> Material {
     let sometimes = |u: f32| if u < 0.5 { 0.0 } else { 2.0 * u - 1.0 };
     Material {
         base_color: [0.2 + 0.7 * a.x, 0.2 + 0.7 * a.y, 0.5, 1.0],
-        roughness: b.x,
-        metallic: sometimes(b.y),
-        transmission: sometimes(c.x),
+        roughness: b.x.into(),
+        metallic: sometimes(b.y).into(),
+        transmission: sometimes(c.x).into(),
         thin: true,
-        clearcoat: sometimes(c.y),
-        clearcoat_roughness: d.x,
-        sheen_color: Rgb::splat(sometimes(d.y)),
-        sheen_roughness: 0.5,
-        diffuse_transmission: sometimes(e.x),
+        clearcoat: sometimes(c.y).into(),
+        clearcoat_roughness: d.x.into(),
+        sheen_color: Rgb::splat(sometimes(d.y)).into(),
+        sheen_roughness: 0.5.into(),
+        diffuse_transmission: sometimes(e.x).into(),
         ..Material::default()
     }
 }
@@ -53,12 +53,17 @@ fn random_scene(seed: u64) -> Description {
     let mut scene = Description::default();
     let material = |index: u64| random_material(100 * seed + index);
     add(&mut scene, "floor", quad(Vec3::new(-2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0), material(0));
-    let screen = Material { transmission: 0.5, metallic: 0.0, ..material(1) };
+    let screen = Material { transmission: 0.5.into(), metallic: 0.0.into(), ..material(1) };
     add(&mut scene, "screen", quad(Vec3::new(-2.0, 0.0, -1.5), Vec3::X * 2.0, Vec3::Y * 2.0), screen);
     add(&mut scene, "mirror", quad(Vec3::new(0.0, 0.0, -1.5), Vec3::X * 2.0, Vec3::Y * 2.0), mirror());
     add(&mut scene, "left", sphere(Vec3::new(-0.9, 0.5, 0.0), 0.4, 24), material(2));
     add(&mut scene, "glass", sphere(Vec3::new(0.0, 0.5, 0.3), 0.4, 24), glass(1.5));
-    add(&mut scene, "rough", sphere(Vec3::new(0.9, 0.5, 0.0), 0.4, 24), Material { roughness: 0.4, ..glass(1.4) });
+    add(
+        &mut scene,
+        "rough",
+        sphere(Vec3::new(0.9, 0.5, 0.0), 0.4, 24),
+        Material { roughness: 0.4.into(), ..glass(1.4) },
+    );
     add(&mut scene, "panel", quad(Vec3::new(0.5, 2.5, -0.5), Vec3::X, Vec3::Z), matte(0.0, 9.0));
     let spot = PunctualKind::Spot { inner: 0.3, outer: 0.5, edge: SpotEdge::default() };
     scene.lights.push(PunctualLight { radius: 0.1, ..point_light(DVec3::new(-1.0, 1.7, 0.5), 4.0) });

@@ -5,7 +5,7 @@ use crate::support;
 use bumpalo::Bump;
 use caustique::bsdf::{Bsdf, EnergyTables, Interface, LobeSet, Parameters, Shading, Transport};
 use caustique::geometry::Surface;
-use caustique::material::Material;
+use caustique::material::{Input, Material};
 use caustique::math::{DAffine3, DMat3, DVec3, Frame, Rgb, Vec2, Vec3, Vec4};
 use caustique::path_class::Effect;
 use caustique::plan::switch;
@@ -50,28 +50,26 @@ fn reference(texture: u32) -> Option<TextureRef> {
     Some(TextureRef { texture, set: 0, transform: IDENTITY })
 }
 
+/// An input that the first texture multiplies.
+fn textured<T, const CHANNEL: usize>(factor: T) -> Input<T, CHANNEL> {
+    Input { factor, texture: reference(0) }
+}
+
 #[test]
 fn factors_textures_and_vertex_colours_multiply() {
     let textures = [texel([0.5, 0.25, 0.75, 0.4]), texel([f32::NAN, 4.0, -1.0, 0.0])];
     let material = Material {
         base_color: [1.0, 0.8, 0.5, 0.5],
         base_color_texture: reference(0),
-        metallic: 0.8,
-        roughness: 0.9,
-        metallic_roughness_texture: reference(0),
-        transmission: 0.5,
-        transmission_texture: reference(0),
-        specular: 0.5,
-        specular_texture: reference(0),
-        specular_color_texture: reference(0),
-        clearcoat: 0.5,
-        clearcoat_texture: reference(0),
-        clearcoat_roughness: 0.8,
-        clearcoat_roughness_texture: reference(0),
-        sheen_color: Rgb::splat(0.5),
-        sheen_color_texture: reference(0),
-        sheen_roughness: 0.5,
-        sheen_roughness_texture: reference(0),
+        metallic: textured(0.8),
+        roughness: textured(0.9),
+        transmission: textured(0.5),
+        specular: textured(0.5),
+        specular_color: textured(Rgb::ONE),
+        clearcoat: textured(0.5),
+        clearcoat_roughness: textured(0.8),
+        sheen_color: textured(Rgb::splat(0.5)),
+        sheen_roughness: textured(0.5),
         emission: Rgb::splat(2.0),
         emission_texture: reference(0),
         ..Material::default()
@@ -92,8 +90,12 @@ fn factors_textures_and_vertex_colours_multiply() {
     near(material.alpha(&surface, &textures), 0.5 * 0.5 * 0.4);
     assert_eq!(material.emitted(&surface, &textures), Rgb::new(1.0, 0.5, 1.5));
     // Invalid texels are clamped.
-    let bad =
-        Material { base_color_texture: reference(1), metallic_roughness_texture: reference(1), ..material.clone() };
+    let bad = Material {
+        base_color_texture: reference(1),
+        metallic: Input { texture: reference(1), ..material.metallic },
+        roughness: Input { texture: reference(1), ..material.roughness },
+        ..material.clone()
+    };
     let p = bad.parameters(&surface, &textures, 1.5);
     assert_eq!((p.base_color, p.metallic), (Rgb::new(0.0, 1.0, 0.0), 0.0));
     assert!(p.alpha_x <= 1.0);
@@ -107,13 +109,10 @@ fn factors_textures_and_vertex_colours_multiply() {
 #[test]
 fn rough_diffuse_reflection_and_coats_follow_their_textures() {
     let material = Material {
-        diffuse_roughness: 0.8,
-        diffuse_roughness_texture: reference(0),
-        clearcoat: 0.5,
-        clearcoat_ior: 2.0,
-        clearcoat_ior_texture: reference(0),
-        clearcoat_color: Rgb::new(1.0, 0.8, 0.5),
-        clearcoat_color_texture: reference(0),
+        diffuse_roughness: textured(0.8),
+        clearcoat: 0.5.into(),
+        clearcoat_ior: textured(2.0),
+        clearcoat_color: textured(Rgb::new(1.0, 0.8, 0.5)),
         emission: Rgb::splat(2.0),
         ..Material::default()
     };
@@ -136,7 +135,7 @@ fn rough_diffuse_reflection_and_coats_follow_their_textures() {
     assert_eq!(flat.parameters(&surface(), none, 1.5), p);
     assert!((flat.emitted(&surface(), none) - passed * 2.0).length() < 1e-6);
     // Without textures the reader has tinted the emission.
-    let mut plain = Material { clearcoat: 1.0, clearcoat_color: Rgb::splat(0.5), ..Material::default() };
+    let mut plain = Material { clearcoat: 1.0.into(), clearcoat_color: Rgb::splat(0.5).into(), ..Material::default() };
     plain.emission = Rgb::ONE;
     plain.tint_emission();
     assert!((plain.emitted(&surface(), none) - Rgb::splat(0.5f32.powf(0.5728))).length() < 1e-3);
@@ -146,10 +145,9 @@ fn rough_diffuse_reflection_and_coats_follow_their_textures() {
 #[test]
 fn textured_coats_lose_no_energy() {
     let coated = Material {
-        clearcoat: 1.0,
-        clearcoat_roughness: 0.3,
-        clearcoat_ior: 2.4,
-        clearcoat_ior_texture: reference(0),
+        clearcoat: 1.0.into(),
+        clearcoat_roughness: 0.3.into(),
+        clearcoat_ior: textured(2.4),
         ..matte(1.0, 0.0)
     };
     let tables = EnergyTables::for_materials(std::slice::from_ref(&coated));
@@ -176,7 +174,7 @@ fn textured_coats_lose_no_energy() {
     let found = worst(&tables);
     assert!(found < 0.006, "{found}");
     // The tables of the largest index alone are rejected.
-    let untextured = Material { clearcoat_ior_texture: None, ..coated.clone() };
+    let untextured = Material { clearcoat_ior: 2.4.into(), ..coated.clone() };
     assert!(worst(&EnergyTables::for_materials(&[untextured])) > 0.02);
 }
 
@@ -186,10 +184,10 @@ fn the_coat_has_its_own_normal_map() {
     let half = std::f32::consts::FRAC_1_SQRT_2;
     let textures = [texel([0.5 + 0.5 * half, 0.5, 0.5 + 0.5 * half, 1.0])];
     let map = reference(0).map(|r| (r, 1.0));
-    let material = Material { clearcoat: 1.0, clearcoat_normal_texture: map, ..Material::default() };
+    let material = Material { clearcoat: 1.0.into(), clearcoat_normal_texture: map, ..Material::default() };
     assert!((material.coat_normal(&surface(), &textures) - Vec3::new(half, 0.0, half)).length() < 1e-5);
     assert_eq!(material.shading_frame(&surface(), &textures).n, Vec3::Z);
-    assert_eq!(Material { clearcoat: 0.0, ..material }.coat_normal(&surface(), &textures), Vec3::Z);
+    assert_eq!(Material { clearcoat: 0.0.into(), ..material }.coat_normal(&surface(), &textures), Vec3::Z);
 }
 
 /// Diffuse transmission is A of its texture, on thin sheets only.
@@ -197,17 +195,16 @@ fn the_coat_has_its_own_normal_map() {
 fn diffuse_transmission_follows_its_textures() {
     let textures = [texel([0.5, 0.25, 0.75, 0.4])];
     let sheet = Material {
-        diffuse_transmission: 0.5,
-        diffuse_transmission_texture: reference(0),
-        diffuse_transmission_color_texture: reference(0),
+        diffuse_transmission: textured(0.5),
+        diffuse_transmission_color: textured(Rgb::ONE),
         ..Material::default()
     };
     let p = sheet.parameters(&surface(), &textures, 1.5);
     assert_eq!((p.diffuse_transmission, p.diffuse_transmission_color), (0.2, Rgb::new(0.5, 0.25, 0.75)));
     assert!(sheet.transmits() && !sheet.is_solid() && !sheet.has_plain_interface());
-    let solid = Material { thin: false, transmission: 0.5, ..sheet };
+    let solid = Material { thin: false, transmission: 0.5.into(), ..sheet };
     assert_eq!(solid.parameters(&surface(), &textures, 1.5).diffuse_transmission, 0.2);
-    assert!(solid.is_solid() && Material { transmission: 0.0, ..solid }.is_solid());
+    assert!(solid.is_solid() && Material { transmission: 0.0.into(), ..solid }.is_solid());
 }
 
 /// The thickness of a thin film is interpolated by G, without a texture it is the maximum, and its index is relative to
@@ -215,13 +212,9 @@ fn diffuse_transmission_follows_its_textures() {
 #[test]
 fn thin_films_follow_their_textures() {
     let textures = [texel([0.5, 0.25, 0.75, 0.4])];
-    let plain = Material { iridescence: 0.8, iridescence_ior: 1.6, ..Material::default() };
-    let textured = Material {
-        iridescence_texture: reference(0),
-        iridescence_thickness: [100.0, 500.0],
-        iridescence_thickness_texture: reference(0),
-        ..plain.clone()
-    };
+    let plain = Material { iridescence: 0.8.into(), iridescence_ior: 1.6, ..Material::default() };
+    let textured =
+        Material { iridescence: textured(0.8), iridescence_thickness: textured([100.0, 500.0]), ..plain.clone() };
     let p = textured.parameters(&surface(), &textures, 1.5);
     assert_eq!((p.film, p.film_eta, p.film_path), (0.4, 1.6, 2.0 * 1.6 * 200.0));
     assert!(!textured.has_plain_interface() && textured.textures().count() == 2);
@@ -242,7 +235,7 @@ fn unlit_gives_its_base_colour_and_scatters_nothing() {
 fn anisotropy_widens_along_its_direction() {
     let material =
         Material { anisotropy: 0.5, anisotropy_rotation: std::f32::consts::FRAC_PI_2, ..Material::default() };
-    let material = Material { roughness: 0.4, ..material };
+    let material = Material { roughness: 0.4.into(), ..material };
     let p = material.parameters(&surface(), &[], 1.5);
     assert!((p.alpha_x - (0.16 + 0.84 * 0.25)).abs() < 1e-6 && (p.alpha_y - 0.16).abs() < 1e-6);
     let frame = material.shading_frame(&surface(), &[]);
@@ -309,7 +302,14 @@ fn frames_of_mirrored_nodes_are_mirror_images() {
 fn rows_are_computed_at_first_use() {
     let glass = |i: usize| {
         let ior = 1.3 + 0.037 * i as f32;
-        Material { ior, metallic: 0.0, roughness: 0.5, transmission: 1.0, thin: false, ..Material::default() }
+        Material {
+            ior,
+            metallic: 0.0.into(),
+            roughness: 0.5.into(),
+            transmission: 1.0.into(),
+            thin: false,
+            ..Material::default()
+        }
     };
     let materials: Vec<Material> = (0..30).map(glass).collect();
     assert!(materials.iter().all(Material::is_solid));

@@ -243,7 +243,14 @@ fn furnace() {
 /// The surface of a body that lets light in and out diffusely, as wax and skin do, with this medium inside.
 fn dense(medium: MediumParameters, specular: f32) -> Material {
     let medium = Some(medium);
-    Material { diffuse_transmission: 1.0, thin: false, medium, specular, roughness: 0.5, ..matte(0.0, 0.0) }
+    Material {
+        diffuse_transmission: 1.0.into(),
+        thin: false,
+        medium,
+        specular: specular.into(),
+        roughness: 0.5.into(),
+        ..matte(0.0, 0.0)
+    }
 }
 
 /// Wax without absorption is invisible under a uniform sky, with and without facets on its surface.
@@ -302,7 +309,7 @@ fn subsurface_scattering_agrees() {
         &mut description,
         "wax",
         block,
-        Material { base_color: [0.4; 4], diffuse_transmission: 0.8, ..dense(wax, 1.0) },
+        Material { base_color: [0.4; 4], diffuse_transmission: 0.8.into(), ..dense(wax, 1.0) },
     );
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 1.9), DVec3::new(0.0, 0.6, 0.0), 55.0));
     let scene = build(description);
@@ -521,7 +528,7 @@ fn coloured_media_in_meshes_agree() {
     let jade = fog([1.5, 0.2, 0.8], [2.0, 6.0, 3.0], 0.4);
     let smoke = fog([0.2, 0.6, 1.0], [1.5, 1.0, 0.5], -0.2);
     let block = cuboid(Vec3::new(-0.8, 0.02, -0.5), Vec3::new(-0.1, 0.9, 0.2), false);
-    add(&mut description, "jade", block, Material { medium: Some(jade), roughness: 0.5, ..glass(1.4) });
+    add(&mut description, "jade", block, Material { medium: Some(jade), roughness: 0.5.into(), ..glass(1.4) });
     add(&mut description, "smoke", sphere(Vec3::new(0.45, 0.6, 0.2), 0.45, 48), holds(smoke));
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 1.9), DVec3::new(0.0, 0.7, 0.0), 55.0));
     let scene = build(description);

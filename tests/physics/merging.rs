@@ -106,7 +106,12 @@ fn caustic_on(floor: Material) -> Scene {
 #[test]
 fn caustics_on_glossy_surfaces_stay_noisy() {
     let relative_variance = |roughness: f32| {
-        let floor = Material { base_color: [0.8, 0.8, 0.8, 1.0], metallic: 1.0, roughness, ..Material::default() };
+        let floor = Material {
+            base_color: [0.8, 0.8, 0.8, 1.0],
+            metallic: 1.0.into(),
+            roughness: roughness.into(),
+            ..Material::default()
+        };
         let scene = caustic_on(floor);
         let camera = scene.camera(&square(32)).expect("a camera");
         let settings = Settings {

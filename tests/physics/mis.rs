@@ -817,7 +817,12 @@ fn check_samples(what: &str, scene: &Scene, radius: f32, paths: u32, samples: Sa
 
 fn room() -> Description {
     let mut description = Description::default();
-    let plastic = Material { base_color: [0.7, 0.6, 0.5, 1.0], metallic: 0.0, roughness: 0.4, ..Material::default() };
+    let plastic = Material {
+        base_color: [0.7, 0.6, 0.5, 1.0],
+        metallic: 0.0.into(),
+        roughness: 0.4.into(),
+        ..Material::default()
+    };
     add(&mut description, "room", cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 3.0), true), plastic);
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 2.8), DVec3::new(0.0, 0.9, 0.0), 50.0));
     description
@@ -842,7 +847,7 @@ fn point_light_and_glass() {
         &mut description,
         "rough",
         sphere(Vec3::new(0.45, 0.45, 0.3), 0.4, 64),
-        Material { roughness: 0.5, ..glass(1.4) },
+        Material { roughness: 0.5.into(), ..glass(1.4) },
     );
     description.lights.push(point_light(DVec3::new(0.1, 1.7, 0.2), 3.0));
     check("point light", &build(description), 0.1, 2000);
@@ -867,7 +872,7 @@ fn outdoors() -> Description {
     let mut description = Description::default();
     let floor = quad(Vec3::new(-1.5, 0.0, -1.5), Vec3::Z * 3.0, Vec3::X * 3.0);
     add(&mut description, "floor", floor, matte(0.5, 0.0));
-    let metal = Material { metallic: 1.0, roughness: 0.4, ..Material::default() };
+    let metal = Material { metallic: 1.0.into(), roughness: 0.4.into(), ..Material::default() };
     add(&mut description, "ball", sphere(Vec3::new(0.3, 0.5, 0.0), 0.5, 64), metal);
     let wall = quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::X * 2.0, Vec3::Y * 2.0);
     add(&mut description, "wall", wall, matte(0.6, 0.0));

@@ -74,7 +74,7 @@ fn furnace_of_nested_shells() {
 fn rays_pass_or_enter_glass_with_alpha_as_a_whole() {
     for alpha in [0.0f32, 0.3, 0.7] {
         let partial =
-            Material { alpha: Alpha::Blend, base_color: [1.0, 1.0, 1.0, alpha], roughness: 0.0, ..glass(1.5) };
+            Material { alpha: Alpha::Blend, base_color: [1.0, 1.0, 1.0, alpha], roughness: 0.0.into(), ..glass(1.5) };
         let mut furnace = Description::default();
         let source = EnvironmentSource::Color(Rgb::ONE);
         furnace.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
@@ -118,8 +118,12 @@ fn subpaths_agree_whether_a_solid_exists() {
         medium,
         ..glass(ior)
     };
-    let wax =
-        Material { transmission: 0.0, diffuse_transmission: 1.0, specular: 0.0, ..partial(0.5, 1.5, Some(white)) };
+    let wax = Material {
+        transmission: 0.0.into(),
+        diffuse_transmission: 1.0.into(),
+        specular: 0.0.into(),
+        ..partial(0.5, 1.5, Some(white))
+    };
     let fog = || partial(0.4, 1.0, Some(white));
     let cases = [
         ("fog", fog(), false, 4.0),

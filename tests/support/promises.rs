@@ -20,9 +20,8 @@ pub fn check(scene: &Description, what: &str) {
         }
     }
     for material in &scene.materials {
-        let numbers =
-            material.base_color.iter().chain([&material.metallic, &material.roughness, &material.transmission]);
-        assert!(numbers.into_iter().all(|x| (0.0..=1.0).contains(x)), "{what}");
+        let shares = [material.metallic.factor, material.roughness.factor, material.transmission.factor];
+        assert!(material.base_color.iter().chain(&shares).all(|x| (0.0..=1.0).contains(x)), "{what}");
         assert!(material.emission.is_finite() && material.ior >= 1.0, "{what}");
         assert!(material.base_color_texture.is_none_or(|t| (t.texture as usize) < scene.textures.len()), "{what}");
     }

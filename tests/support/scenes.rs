@@ -15,8 +15,8 @@ use caustique::transport::{CameraPaths, Indirect, InitialMedia};
 pub fn matte(reflectance: f32, emission: f32) -> Material {
     Material {
         base_color: [reflectance, reflectance, reflectance, 1.0],
-        metallic: 0.0,
-        specular: 0.0,
+        metallic: 0.0.into(),
+        specular: 0.0.into(),
         emission: Rgb::splat(emission),
         ..Material::default()
     }
@@ -24,12 +24,19 @@ pub fn matte(reflectance: f32, emission: f32) -> Material {
 
 /// Perfectly smooth solid glass.
 pub fn glass(ior: f32) -> Material {
-    Material { metallic: 0.0, roughness: 0.0, transmission: 1.0, thin: false, ior, ..Material::default() }
+    Material {
+        metallic: 0.0.into(),
+        roughness: 0.0.into(),
+        transmission: 1.0.into(),
+        thin: false,
+        ior,
+        ..Material::default()
+    }
 }
 
 /// A perfect mirror.
 pub fn mirror() -> Material {
-    Material { metallic: 1.0, roughness: 0.0, ..Material::default() }
+    Material { metallic: 1.0.into(), roughness: 0.0.into(), ..Material::default() }
 }
 
 /// Adds a mesh with its own material.
@@ -172,11 +179,20 @@ pub fn lit_room(walls: Material) -> Description {
 
 /// Balls of rough metal in a room of plastic: layered lobes, wide and narrow.
 pub fn glossy_balls() -> Description {
-    let plastic = Material { base_color: [0.6, 0.4, 0.3, 1.0], metallic: 0.0, roughness: 0.3, ..Material::default() };
+    let plastic = Material {
+        base_color: [0.6, 0.4, 0.3, 1.0],
+        metallic: 0.0.into(),
+        roughness: 0.3.into(),
+        ..Material::default()
+    };
     let mut description = lit_room(plastic);
-    let metal =
-        |roughness| Material { base_color: [0.9, 0.7, 0.4, 1.0], metallic: 1.0, roughness, ..Material::default() };
-    add(&mut description, "narrow", sphere(Vec3::new(-0.45, 0.4, 0.0), 0.4, 64), metal(0.35));
-    add(&mut description, "wide", sphere(Vec3::new(0.45, 0.4, 0.3), 0.4, 64), metal(0.7));
+    let metal = |roughness| Material {
+        base_color: [0.9, 0.7, 0.4, 1.0],
+        metallic: 1.0.into(),
+        roughness,
+        ..Material::default()
+    };
+    add(&mut description, "narrow", sphere(Vec3::new(-0.45, 0.4, 0.0), 0.4, 64), metal(0.35.into()));
+    add(&mut description, "wide", sphere(Vec3::new(0.45, 0.4, 0.3), 0.4, 64), metal(0.7.into()));
     description
 }

@@ -59,8 +59,8 @@ impl TriangleLight {
         if material.unlit {
             coat = 0.0;
         }
-        if material.clearcoat_ior_texture.is_none() {
-            coat_ior = material.clearcoat_ior;
+        if material.clearcoat_ior.texture.is_none() {
+            coat_ior = material.clearcoat_ior.factor;
         }
         let textured = material.has_textured_emission();
         let uniform = !textured && matches!(material.alpha, Alpha::Opaque);

@@ -143,13 +143,8 @@ pub(super) fn read(
         name,
         base_color: reader.units(pbr.base_color_factor, "baseColorFactor")?,
         base_color_texture: reader.texture(pbr.base_color_texture, Use::Color, "baseColorTexture")?,
-        metallic: reader.unit(pbr.metallic_factor, "metallicFactor")?,
-        roughness: reader.unit(pbr.roughness_factor, "roughnessFactor")?,
-        metallic_roughness_texture: reader.texture(
-            pbr.metallic_roughness_texture,
-            Use::Data,
-            "metallicRoughnessTexture",
-        )?,
+        metallic: reader.unit(pbr.metallic_factor, "metallicFactor")?.into(),
+        roughness: reader.unit(pbr.roughness_factor, "roughnessFactor")?.into(),
         emission: reader.color(core.emissive_factor, f32::MAX, "emissiveFactor")?,
         emission_texture: reader.texture(core.emissive_texture, Use::Color, "emissiveTexture")?,
         alpha: match core.alpha_mode.as_str() {
@@ -161,6 +156,8 @@ pub(super) fn read(
         double_sided: core.double_sided,
         ..Material::default()
     };
+    let texture = reader.texture(pbr.metallic_roughness_texture, Use::Data, "metallicRoughnessTexture")?;
+    (material.metallic.texture, material.roughness.texture) = (texture, texture);
     material.normal_texture = reader.normal_map(core.normal_texture, "normalTexture")?;
     reader.specular_glossiness(&mut material)?;
     reader.surface(&mut material)?;
@@ -236,18 +233,18 @@ impl Reader<'_> {
         self.warnings.push(format!("{}: {NAME} is translated, so highlights differ a little", self.place));
         material.base_color = self.units(old.diffuse_factor, "diffuseFactor")?;
         material.base_color_texture = self.texture(old.diffuse_texture, Use::Color, "diffuseTexture")?;
-        material.metallic = 0.0;
-        material.metallic_roughness_texture = None;
+        material.metallic = 0.0.into();
+        material.roughness.texture = None;
         material.ior = f32::INFINITY;
-        material.specular_color = self.color(old.specular_factor, 1.0, "specularFactor")?;
+        material.specular_color.factor = self.color(old.specular_factor, 1.0, "specularFactor")?;
         let glossiness = self.unit(old.glossiness_factor, "glossinessFactor")?;
-        material.roughness = 1.0 - glossiness;
+        material.roughness.factor = 1.0 - glossiness;
         if let Some(info) = old.specular_glossiness_texture {
             let name = "specularGlossinessTexture";
-            material.specular_color_texture = self.texture(Some(info.clone()), Use::Color, name)?;
-            material.roughness = 1.0;
+            material.specular_color.texture = self.texture(Some(info.clone()), Use::Color, name)?;
+            material.roughness.factor = 1.0;
             let usage = Use::Glossiness(glossiness.to_bits());
-            material.metallic_roughness_texture = self.texture(Some(info), usage, name)?;
+            material.roughness.texture = self.texture(Some(info), usage, name)?;
         }
         Ok(())
     }
@@ -271,10 +268,10 @@ impl Reader<'_> {
             };
         }
         if let Some(e) = self.extension::<Specular>("KHR_materials_specular")? {
-            material.specular = self.unit(e.specular_factor, "specularFactor")?;
-            material.specular_texture = self.texture(e.specular_texture, Use::Data, "specularTexture")?;
-            material.specular_color = self.color(e.specular_color_factor, f32::MAX, "specularColorFactor")?;
-            material.specular_color_texture =
+            material.specular.factor = self.unit(e.specular_factor, "specularFactor")?;
+            material.specular.texture = self.texture(e.specular_texture, Use::Data, "specularTexture")?;
+            material.specular_color.factor = self.color(e.specular_color_factor, f32::MAX, "specularColorFactor")?;
+            material.specular_color.texture =
                 self.texture(e.specular_color_texture, Use::Color, "specularColorTexture")?;
         }
         if let Some(e) = self.extension::<Dispersion>("KHR_materials_dispersion")? {
@@ -286,49 +283,50 @@ impl Reader<'_> {
     fn diffuse_transmission(&mut self, material: &mut Material) -> Result<()> {
         const NAME: &str = "KHR_materials_diffuse_transmission";
         let Some(e) = self.extension::<DiffuseTransmission>(NAME)? else { return Ok(()) };
-        material.diffuse_transmission = self.unit(e.diffuse_transmission_factor, "diffuseTransmissionFactor")?;
-        material.diffuse_transmission_texture =
+        material.diffuse_transmission.factor = self.unit(e.diffuse_transmission_factor, "diffuseTransmissionFactor")?;
+        material.diffuse_transmission.texture =
             self.texture(e.diffuse_transmission_texture, Use::Data, "diffuseTransmissionTexture")?;
-        material.diffuse_transmission_color =
+        material.diffuse_transmission_color.factor =
             self.color(e.diffuse_transmission_color_factor, 1.0, "diffuseTransmissionColorFactor")?;
-        material.diffuse_transmission_color_texture =
+        material.diffuse_transmission_color.texture =
             self.texture(e.diffuse_transmission_color_texture, Use::Color, "diffuseTransmissionColorTexture")?;
         Ok(())
     }
 
     fn thin_film(&mut self, material: &mut Material) -> Result<()> {
         let Some(e) = self.extension::<Iridescence>("KHR_materials_iridescence")? else { return Ok(()) };
-        material.iridescence = self.unit(e.iridescence_factor, "iridescenceFactor")?;
-        material.iridescence_texture = self.texture(e.iridescence_texture, Use::Data, "iridescenceTexture")?;
+        material.iridescence.factor = self.unit(e.iridescence_factor, "iridescenceFactor")?;
+        material.iridescence.texture = self.texture(e.iridescence_texture, Use::Data, "iridescenceTexture")?;
         material.iridescence_ior = self.finite(e.iridescence_ior, "iridescenceIor")?;
         if material.iridescence_ior < 1.0 {
             self.warnings.push(format!("{}: an iridescenceIor of {} is raised to 1", self.place, e.iridescence_ior));
             material.iridescence_ior = 1.0;
         }
-        material.iridescence_thickness = [
+        material.iridescence_thickness.factor = [
             self.range(e.iridescence_thickness_minimum, f32::MAX, "iridescenceThicknessMinimum")?,
             self.range(e.iridescence_thickness_maximum, f32::MAX, "iridescenceThicknessMaximum")?,
         ];
-        material.iridescence_thickness_texture =
+        material.iridescence_thickness.texture =
             self.texture(e.iridescence_thickness_texture, Use::Data, "iridescenceThicknessTexture")?;
         Ok(())
     }
 
     fn coatings(&mut self, material: &mut Material) -> Result<()> {
         if let Some(e) = self.extension::<Clearcoat>("KHR_materials_clearcoat")? {
-            material.clearcoat = self.unit(e.clearcoat_factor, "clearcoatFactor")?;
-            material.clearcoat_texture = self.texture(e.clearcoat_texture, Use::Data, "clearcoatTexture")?;
-            material.clearcoat_roughness = self.unit(e.clearcoat_roughness_factor, "clearcoatRoughnessFactor")?;
-            material.clearcoat_roughness_texture =
+            material.clearcoat.factor = self.unit(e.clearcoat_factor, "clearcoatFactor")?;
+            material.clearcoat.texture = self.texture(e.clearcoat_texture, Use::Data, "clearcoatTexture")?;
+            material.clearcoat_roughness.factor =
+                self.unit(e.clearcoat_roughness_factor, "clearcoatRoughnessFactor")?;
+            material.clearcoat_roughness.texture =
                 self.texture(e.clearcoat_roughness_texture, Use::Data, "clearcoatRoughnessTexture")?;
             material.clearcoat_normal_texture =
                 self.normal_map(e.clearcoat_normal_texture, "clearcoatNormalTexture")?;
         }
         if let Some(e) = self.extension::<Sheen>("KHR_materials_sheen")? {
-            material.sheen_color = self.color(e.sheen_color_factor, 1.0, "sheenColorFactor")?;
-            material.sheen_color_texture = self.texture(e.sheen_color_texture, Use::Color, "sheenColorTexture")?;
-            material.sheen_roughness = self.unit(e.sheen_roughness_factor, "sheenRoughnessFactor")?;
-            material.sheen_roughness_texture =
+            material.sheen_color.factor = self.color(e.sheen_color_factor, 1.0, "sheenColorFactor")?;
+            material.sheen_color.texture = self.texture(e.sheen_color_texture, Use::Color, "sheenColorTexture")?;
+            material.sheen_roughness.factor = self.unit(e.sheen_roughness_factor, "sheenRoughnessFactor")?;
+            material.sheen_roughness.texture =
                 self.texture(e.sheen_roughness_texture, Use::Data, "sheenRoughnessTexture")?;
         }
         if let Some(e) = self.extension::<Anisotropy>("KHR_materials_anisotropy")? {
@@ -343,8 +341,8 @@ impl Reader<'_> {
     /// (`Some(true)`) or thin (`Some(false)`), or neither.
     fn transmission(&mut self, material: &mut Material) -> Result<Option<bool>> {
         if let Some(e) = self.extension::<Transmission>("KHR_materials_transmission")? {
-            material.transmission = self.unit(e.transmission_factor, "transmissionFactor")?;
-            material.transmission_texture = self.texture(e.transmission_texture, Use::Data, "transmissionTexture")?;
+            material.transmission.factor = self.unit(e.transmission_factor, "transmissionFactor")?;
+            material.transmission.texture = self.texture(e.transmission_texture, Use::Data, "transmissionTexture")?;
         }
         let mut solid = None;
         if let Some(e) = self.extension::<Volume>("KHR_materials_volume")? {
@@ -359,7 +357,7 @@ impl Reader<'_> {
         let own: MaterialExtras = extras::read(self.raw, self.place)?;
         material.priority = own.priority;
         material.optical_contact = own.contact == Some(extras::Contact::Optical);
-        material.null_bsdf = own.null_bsdf && material.transmission == 0.0;
+        material.null_bsdf = own.null_bsdf && material.transmission.factor == 0.0;
         if own.null_bsdf && !material.null_bsdf {
             self.warnings.push(format!("{}: its null_bsdf is ignored: it transmits light by itself", self.place));
         }
@@ -387,20 +385,20 @@ impl Reader<'_> {
     fn own_layers(&mut self, material: &mut Material, own: &MaterialExtras) -> Result<()> {
         // With a texture, the factor is 1 unless the file has one, as for glTF's own factors.
         let rough = own.diffuse_roughness.unwrap_or(f32::from(u8::from(own.diffuse_roughness_texture.is_some())));
-        material.diffuse_roughness = self.unit(rough, "extras.caustique.diffuse_roughness")?;
-        material.diffuse_roughness_texture =
+        material.diffuse_roughness.factor = self.unit(rough, "extras.caustique.diffuse_roughness")?;
+        material.diffuse_roughness.texture =
             self.texture(own.diffuse_roughness_texture.clone(), Use::Data, "diffuse_roughness_texture")?;
         if let Some(ior) = own.coat_ior {
-            material.clearcoat_ior = self.finite(ior, "extras.caustique.coat_ior")?.max(1.0);
+            material.clearcoat_ior.factor = self.finite(ior, "extras.caustique.coat_ior")?.max(1.0);
             if ior < 1.0 {
                 self.warnings.push(format!("{}: its coat_ior of {ior} is raised to 1", self.place));
             }
         }
-        material.clearcoat_ior_texture = self.texture(own.coat_ior_texture.clone(), Use::Data, "coat_ior_texture")?;
-        material.clearcoat_color_texture =
+        material.clearcoat_ior.texture = self.texture(own.coat_ior_texture.clone(), Use::Data, "coat_ior_texture")?;
+        material.clearcoat_color.texture =
             self.texture(own.coat_color_texture.clone(), Use::Color, "coat_color_texture")?;
         if let Some(color) = own.coat_color {
-            material.clearcoat_color = self.color(color, 1.0, "extras.caustique.coat_color")?;
+            material.clearcoat_color.factor = self.color(color, 1.0, "extras.caustique.coat_color")?;
             material.tint_emission();
         }
         material.sheen_model = match own.sheen_model {

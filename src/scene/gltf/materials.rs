@@ -72,7 +72,7 @@ impl Library {
             self.loaded.insert(index, loaded);
         }
         let loaded = &self.loaded[&index];
-        let transmits = loaded.material.transmission > 0.0;
+        let transmits = loaded.material.transmission.factor > 0.0;
         let solid = if transmits {
             loaded.solid.unwrap_or(match self.glass {
                 Glass::Auto => closed,

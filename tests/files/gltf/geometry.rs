@@ -31,7 +31,7 @@ fn hierarchy_is_composed_and_meshes_are_shared() {
     let cube = &scene.meshes[0];
     assert!(cube.closed && cube.triangles.len() == 12 && cube.normals.is_empty() && cube.name == "cube");
     assert_eq!(scene.warnings, [""; 0]);
-    assert_eq!(scene.materials[0].metallic, 1.0);
+    assert_eq!(scene.materials[0].metallic, 1.0.into());
 }
 
 #[test]

@@ -63,32 +63,32 @@ fn every_field_is_read() {
     assert_eq!(warnings, Vec::<String>::new());
     assert_eq!((m.name.as_str(), m.double_sided, m.alpha, m.unlit), ("all", true, Alpha::Mask(0.25), true));
     assert!(!m.culled);
-    assert_eq!((m.base_color, m.metallic, m.roughness), ([0.1, 0.2, 0.3, 0.4], 0.5, 0.6));
+    assert_eq!((m.base_color, m.metallic.factor, m.roughness.factor), ([0.1, 0.2, 0.3, 0.4], 0.5, 0.6));
     // Colours and data use two textures of one image.
     let set = |t: Option<caustique::texture::TextureRef>| t.map(|t| (t.texture, t.set));
     assert_eq!(set(m.base_color_texture), Some((0, 0)));
-    assert_eq!(set(m.metallic_roughness_texture), Some((1, 1)));
+    assert_eq!(set(m.roughness.texture), Some((1, 1)));
     assert_eq!((set(m.emission_texture), m.normal_texture.map(|t| t.1)), (Some((0, 0)), Some(-2.0)));
-    assert_eq!((m.emission, m.ior, m.transmission), (Rgb::new(12.0, 6.0, 0.0), 1.33, 0.9));
+    assert_eq!((m.emission, m.ior, m.transmission.factor), (Rgb::new(12.0, 6.0, 0.0), 1.33, 0.9));
     let sigma_a = m.medium.unwrap().sigma_a;
     assert!((sigma_a - Rgb::new(0.0, 2.0 * 2f32.ln(), 4.0 * 2f32.ln())).length() < 1e-6, "{sigma_a}");
     assert!(!m.thin && m.priority == 3);
-    assert_eq!((m.specular, m.specular_color), (0.8, Rgb::new(2.0, 1.0, 0.5)));
-    assert_eq!((set(m.specular_texture), set(m.specular_color_texture)), (Some((1, 0)), Some((0, 0))));
-    assert_eq!((m.diffuse_transmission, m.diffuse_transmission_color), (0.3, Rgb::new(0.5, 1.0, 0.0)));
-    let behind = (set(m.diffuse_transmission_texture), set(m.diffuse_transmission_color_texture));
+    assert_eq!((m.specular.factor, m.specular_color.factor), (0.8, Rgb::new(2.0, 1.0, 0.5)));
+    assert_eq!((set(m.specular.texture), set(m.specular_color.texture)), (Some((1, 0)), Some((0, 0))));
+    assert_eq!((m.diffuse_transmission.factor, m.diffuse_transmission_color.factor), (0.3, Rgb::new(0.5, 1.0, 0.0)));
+    let behind = (set(m.diffuse_transmission.texture), set(m.diffuse_transmission_color.texture));
     assert_eq!(behind, (Some((1, 0)), Some((0, 0))));
     assert_eq!(m.clearcoat_normal_texture.map(|(_, scale)| scale), Some(0.5));
-    assert_eq!((m.iridescence, m.iridescence_ior, m.iridescence_thickness), (0.6, 1.4, [50.0, 600.0]));
-    assert_eq!((set(m.iridescence_texture), set(m.iridescence_thickness_texture)), (Some((1, 0)), Some((1, 1))));
-    assert_eq!((m.clearcoat, m.clearcoat_roughness), (0.7, 0.3));
-    assert_eq!((m.diffuse_roughness, set(m.diffuse_roughness_texture)), (1.0, Some((1, 0))));
-    assert_eq!((m.clearcoat_ior, set(m.clearcoat_ior_texture)), (2.0, Some((1, 1))));
-    assert_eq!((m.clearcoat_color, set(m.clearcoat_color_texture)), (Rgb::ONE, Some((0, 1))));
-    assert_eq!((m.sheen_color, m.sheen_roughness), (Rgb::new(0.1, 0.2, 0.3), 0.4));
-    assert_eq!((set(m.sheen_color_texture), set(m.sheen_roughness_texture)), (Some((0, 0)), Some((1, 0))));
+    assert_eq!((m.iridescence.factor, m.iridescence_ior, m.iridescence_thickness.factor), (0.6, 1.4, [50.0, 600.0]));
+    assert_eq!((set(m.iridescence.texture), set(m.iridescence_thickness.texture)), (Some((1, 0)), Some((1, 1))));
+    assert_eq!((m.clearcoat.factor, m.clearcoat_roughness.factor), (0.7, 0.3));
+    assert_eq!((m.diffuse_roughness.factor, set(m.diffuse_roughness.texture)), (1.0, Some((1, 0))));
+    assert_eq!((m.clearcoat_ior.factor, set(m.clearcoat_ior.texture)), (2.0, Some((1, 1))));
+    assert_eq!((m.clearcoat_color.factor, set(m.clearcoat_color.texture)), (Rgb::ONE, Some((0, 1))));
+    assert_eq!((m.sheen_color.factor, m.sheen_roughness.factor), (Rgb::new(0.1, 0.2, 0.3), 0.4));
+    assert_eq!((set(m.sheen_color.texture), set(m.sheen_roughness.texture)), (Some((0, 0)), Some((1, 0))));
     assert_eq!((m.anisotropy, m.anisotropy_rotation, m.dispersion), (0.5, 1.5, 0.36));
-    assert!(m.clearcoat_texture.is_some() && m.clearcoat_roughness_texture.is_some() && m.anisotropy_texture.is_some());
+    assert!(m.clearcoat.texture.is_some() && m.clearcoat_roughness.texture.is_some() && m.anisotropy_texture.is_some());
 }
 
 #[test]
@@ -98,10 +98,10 @@ fn defaults_and_legacy_values() {
     let glass = json!({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 0.5}}});
     assert!(!material(glass).0.culled, "the back faces of glass are seen");
     assert_eq!(
-        (m.name.as_str(), m.base_color, m.metallic, m.roughness, m.ior),
+        (m.name.as_str(), m.base_color, m.metallic.factor, m.roughness.factor, m.ior),
         ("material 0", [1.0; 4], 1.0, 1.0, 1.5)
     );
-    assert_eq!((m.alpha, m.transmission, m.specular, m.thin), (Alpha::Opaque, 0.0, 1.0, true));
+    assert_eq!((m.alpha, m.transmission.factor, m.specular.factor, m.thin), (Alpha::Opaque, 0.0, 1.0, true));
     let (m, _) = material(json!({"alphaMode": "BLEND", "extensions": {"KHR_materials_ior": {"ior": 0}}}));
     assert_eq!((m.alpha, m.ior), (Alpha::Blend, f32::INFINITY));
 }
@@ -115,7 +115,7 @@ fn numbers_out_of_range_are_moved_with_a_warning() {
             "KHR_materials_volume": {"thicknessFactor": 1, "attenuationDistance": 1, "attenuationColor": [0, 1, 1]},
             "KHR_materials_iridescence": {"iridescenceFactor": 1, "iridescenceIor": 0.9},
             "KHR_materials_subsurface": {}}}));
-    assert_eq!((m.metallic, m.ior, m.iridescence_ior), (1.0, 1.0, 1.0));
+    assert_eq!((m.metallic.factor, m.ior, m.iridescence_ior), (1.0, 1.0, 1.0));
     assert!((m.medium.unwrap().sigma_a.x - 1e6f32.ln()).abs() < 1e-3);
     assert_eq!(
         warnings,
@@ -135,8 +135,8 @@ fn specular_glossiness_is_translated() {
     let (m, warnings) = material(json!({"name": "old", "extensions": {"KHR_materials_pbrSpecularGlossiness": {
         "diffuseFactor": [0.5, 0.4, 0.3, 1], "specularFactor": [0.2, 0.1, 0.05],
         "specularGlossinessTexture": {"index": 0}}}}));
-    assert_eq!((m.base_color, m.metallic, m.ior), ([0.5, 0.4, 0.3, 1.0], 0.0, f32::INFINITY));
-    assert_eq!((m.specular_color, m.roughness), (Rgb::new(0.2, 0.1, 0.05), 1.0));
+    assert_eq!((m.base_color, m.metallic.factor, m.ior), ([0.5, 0.4, 0.3, 1.0], 0.0, f32::INFINITY));
+    assert_eq!((m.specular_color.factor, m.roughness.factor), (Rgb::new(0.2, 0.1, 0.05), 1.0));
     assert_eq!(
         warnings,
         ["material \"old\": KHR_materials_pbrSpecularGlossiness is translated, so highlights differ a little"]
@@ -144,9 +144,9 @@ fn specular_glossiness_is_translated() {
     for factor in [1.0f32, 0.5, 0.0] {
         let scene = read(&wearing(json!({"extensions": {"KHR_materials_pbrSpecularGlossiness": {
             "glossinessFactor": factor, "specularGlossinessTexture": {"index": 0}}}})));
-        let rough = scene.materials[0].metallic_roughness_texture.unwrap();
+        let rough = scene.materials[0].roughness.texture.unwrap();
         let texel = scene.textures[rough.texture as usize].sample(Vec2::new(0.75, 0.5));
-        let roughness = scene.materials[0].roughness * texel.y;
+        let roughness = scene.materials[0].roughness.factor * texel.y;
         assert!((roughness - (1.0 - factor * 128.0 / 255.0)).abs() < 1e-6, "{roughness}");
         assert_eq!(scene.warnings.len(), 1);
     }
@@ -395,15 +395,15 @@ fn extras_of_materials() {
         ]
     );
     let (m, warnings) = material(json!({"extras": {"caustique": {"diffuse_roughness": 0.25}}}));
-    assert!(m.diffuse_roughness == 0.25 && warnings.is_empty());
+    assert!(m.diffuse_roughness == 0.25.into() && warnings.is_empty());
     let (m, warnings) = material(json!({"name": "wall", "extras": {"caustique": {"diffuse_roughness": 2}}}));
-    assert_eq!(m.diffuse_roughness, 1.0);
+    assert_eq!(m.diffuse_roughness, 1.0.into());
     assert_eq!(warnings, ["material \"wall\": extras.caustique.diffuse_roughness is 2; 1 is used"]);
     let coat = json!({"KHR_materials_clearcoat": {"clearcoatFactor": 1}});
     let keys = json!({"coat_ior": 0.5, "coat_color": [1, 0.25, 0]});
     let (m, warnings) = material(json!({
         "name": "wood", "extensions": coat, "emissiveFactor": [1, 1, 1], "extras": {"caustique": keys}}));
-    assert_eq!((m.clearcoat_ior, m.clearcoat_color), (1.0, Rgb::new(1.0, 0.25, 0.0)));
+    assert_eq!((m.clearcoat_ior.factor, m.clearcoat_color.factor), (1.0, Rgb::new(1.0, 0.25, 0.0)));
     assert_eq!(warnings, ["material \"wood\": its coat_ior of 0.5 is raised to 1"]);
     // At an index of 1, the mean path is 2; it is passed once.
     assert!((m.emission - Rgb::new(1.0, 0.25, 0.0)).length() < 1e-6, "{}", m.emission);

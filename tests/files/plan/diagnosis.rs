@@ -106,12 +106,12 @@ fn terminators_that_follow_the_facets() {
 
 #[test]
 fn glass_too_rough_for_a_caustic() {
-    let frosted = Material { roughness: 0.6, ..glass(1.5) };
+    let frosted = Material { roughness: 0.6.into(), ..glass(1.5) };
     assert_eq!(
         warning(ball(frosted)),
         "material \"Ball\" on \"Ball\": its roughness of 0.6 spreads light too wide for a caustic to show; 0.45 and more is frosted"
     );
-    silent(ball(Material { roughness: 0.3, ..glass(1.5) }));
+    silent(ball(Material { roughness: 0.3.into(), ..glass(1.5) }));
 }
 
 /// A lamp of flux 4 pi I beside a panel of flux pi L A, in one system of units and in two.
@@ -281,7 +281,7 @@ fn alpha_in_place_of_glass() {
     let faded = |alpha: f32, roughness: f32| Material {
         base_color: [1.0, 1.0, 1.0, alpha],
         alpha: Alpha::Blend,
-        roughness,
+        roughness: roughness.into(),
         ..matte(0.8, 0.0)
     };
     assert_eq!(

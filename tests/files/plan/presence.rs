@@ -27,7 +27,7 @@ fn effects_are_there_for_reasons() {
     assert_eq!(present(&everything), "emission direct indirect caustic sds dispersion");
     // A perfect mirror and clear glass have no glossy reflection. A rough mirror has, and a coated one.
     let disc = scene.materials.len() - 1;
-    for glossy in [Material { roughness: 0.1, ..mirror() }, Material { clearcoat: 1.0, ..mirror() }] {
+    for glossy in [Material { roughness: 0.1.into(), ..mirror() }, Material { clearcoat: 1.0.into(), ..mirror() }] {
         let mut scene = scene.clone();
         scene.materials[disc] = glossy;
         assert_eq!(present(&plan(scene)), "emission direct indirect glossy caustic sds dispersion");
@@ -76,16 +76,16 @@ fn photons_carry_gloss_only_of_lamps_behind_glass_or_mirrors() {
         add(&mut scene, "Disc", sphere(Vec3::new(2.0, 1.0, 0.0), 0.5, 16), shining);
         plan(scene).effect(Effect::Glossy).by
     };
-    let brushed = Material { roughness: 0.3, ..mirror() };
-    let varnished = Material { clearcoat: 1.0, clearcoat_roughness: 0.1, ..matte(0.5, 0.0) };
-    let frosted = Material { roughness: 0.2, ..glass(1.5) };
+    let brushed = Material { roughness: 0.3.into(), ..mirror() };
+    let varnished = Material { clearcoat: 1.0.into(), clearcoat_roughness: 0.1.into(), ..matte(0.5, 0.0) };
+    let frosted = Material { roughness: 0.2.into(), ..glass(1.5) };
     let both = Some("camera paths and photons");
     assert_eq!([&brushed, &varnished].map(|shining| by(true, glass(1.5), shining.clone())), [both; 2]);
     let camera_paths = Some("camera paths");
     assert_eq!(by(false, glass(1.5), brushed.clone()), camera_paths);
     assert_eq!(by(true, frosted, brushed.clone()), camera_paths);
     assert_eq!(by(true, matte(0.5, 0.0), brushed), camera_paths);
-    assert_eq!(by(true, glass(1.5), Material { clearcoat: 1.0, ..mirror() }), camera_paths);
+    assert_eq!(by(true, glass(1.5), Material { clearcoat: 1.0.into(), ..mirror() }), camera_paths);
 }
 
 #[test]

@@ -78,7 +78,7 @@ fn a_slit_of_light() {
 fn lobes_as_sharp_as_mirrors() {
     let mut description = lit(0.8);
     for (x, roughness) in [(-0.5, 0.02), (0.0, 0.05), (0.5, 0.1)] {
-        let metal = Material { metallic: 1.0, roughness, ..Material::default() };
+        let metal = Material { metallic: 1.0.into(), roughness: roughness.into(), ..Material::default() };
         add(&mut description, "metal", sphere(Vec3::new(x, 0.3, 0.2), 0.24, 64), metal);
     }
     checked("sharp", description, 1e-3, Bug::Reverse);
@@ -89,7 +89,7 @@ fn glass_that_hardly_bends_and_glass_that_bends_much() {
     let mut description = lit(0.2);
     for (x, ior, roughness) in [(-0.5, 1.0001, 0.3), (0.0, 4.0, 0.1), (0.5, 1.5, 0.0)] {
         let ball = sphere(Vec3::new(x, 0.3, 0.2), 0.24, 64);
-        add(&mut description, "glass", ball, Material { roughness, ..glass(ior) });
+        add(&mut description, "glass", ball, Material { roughness: roughness.into(), ..glass(ior) });
     }
     checked("glass", description, 0.1, Bug::DirectMerged);
 }
