@@ -117,7 +117,7 @@ fn sphere_light_over_a_plane() {
     // The polyhedron of 128 segments is smaller than the sphere by 1e-3, and kernels average the curvature of the
     // irradiance.
     let check = Check { expected, bias: 2.5e-3, detects: 0.1 };
-    check_all(check, "sphere light", &scene, &all(), 600, 0.06);
+    check_all(check, "sphere light", &scene, &all(), 1500, 0.06);
 }
 
 /// A point light over a plane and its mirror image, which a path tracer cannot find.
