@@ -2,6 +2,7 @@
 
 mod account;
 mod clock;
+mod initial_bandwidth;
 mod input;
 mod pass;
 mod session;
@@ -13,11 +14,12 @@ pub use account::{
     RenderStats, Rendered, ShardResult, StopReason, UnseenLight,
 };
 pub use clock::{Clock, Phases, TimeSpent, cpu_seconds, peak_memory};
+pub use initial_bandwidth::{InitialBandwidth, MIN_USER_RADIUS_RATIO, SCREEN_CAP};
 pub use input::{Motion, RenderInput};
 pub(crate) use pass::Cost;
 pub use pass::{
-    InitialBandwidth, MAX_TECHNIQUES, MIN_USER_RADIUS_RATIO, Moments, PHOTON_BYTES, PhotonCounts, Proxy, SCREEN_CAP,
-    TechniquePicture, WHOLE_TILE, bytes_per_whole_tile, photons_per_path, sample_bytes,
+    MAX_TECHNIQUES, Moments, PHOTON_BYTES, PhotonCounts, Proxy, TechniquePicture, WHOLE_TILE, bytes_per_whole_tile,
+    photons_per_path, sample_bytes,
 };
 pub use session::{Control, ExpectedError, MIN_ITERATIONS_FOR_ERROR, Progress, Session, State, render, run_session};
 pub use settings::{

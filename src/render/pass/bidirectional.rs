@@ -12,8 +12,6 @@
 //! the second. The pairs share nothing but the photons, which both light paths leave.
 
 use super::guiding::{guide_at, learn_guide};
-use super::initial_bandwidth::InitialBandwidth;
-use super::initial_bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
 use super::integrator::{Integrator, Work};
 use super::light_cells::{LightCells, TracedPaths};
 use super::photon_counts::PhotonCounts;
@@ -28,6 +26,8 @@ use crate::photon::{ByKind, PhotonMap};
 use crate::random::{Domain, Purpose, Streams};
 use crate::render::clock::Phases;
 use crate::render::clock::cpu_seconds;
+use crate::render::initial_bandwidth::InitialBandwidth;
+use crate::render::initial_bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
 use crate::render::input::RenderInput;
 use crate::render::settings::Settings;
 use crate::spectrum::{IterationWavelengths, WavelengthSample};

@@ -1,12 +1,12 @@
 //! Counted cost of an iteration: numbers of vertices times constants. The constants are core-seconds, fitted on one
 //! machine by `scripts/lab.sh cost`; choices depend on their ratios only.
 
-use super::initial_bandwidth::InitialBandwidth;
-use super::initial_bandwidth::footprint;
 use crate::camera::Camera;
 use crate::light::Guide;
 use crate::path_class::{ClassSet, Effect, PathClass, classes_in};
 use crate::plan::Search;
+use crate::render::initial_bandwidth::InitialBandwidth;
+use crate::render::initial_bandwidth::footprint;
 use crate::render::settings::{BandwidthRule, Candidate, Settings};
 use crate::scene::{Scene, Survey};
 use crate::transport::{CameraPaths, Indirect, InitialMedia, VertexCounts};

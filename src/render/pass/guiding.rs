@@ -9,13 +9,13 @@
 //! error, it is dropped.
 
 use super::cost::{Cost, GUIDED_START};
-use super::initial_bandwidth::{SCREEN_CAP, picture_width_at};
 use super::light_path_ranges::light_path_ranges;
 use crate::light::{Guide, Region};
 use crate::math::{Rgb, Vec3, luminance};
 use crate::path_class::ClassSet;
 use crate::photon::{ByKind, Located, Nearest, Photon, PhotonMap, kind};
 use crate::random::{Domain, Purpose, Stream};
+use crate::render::initial_bandwidth::{SCREEN_CAP, picture_width_at};
 use crate::render::input::RenderInput;
 use crate::render::settings::Candidate;
 use crate::render::settings::Settings;

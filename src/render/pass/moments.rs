@@ -14,8 +14,6 @@
 //! Direct light is sampled alike by all candidates. Its variance is measured, and is the same for all of them.
 
 use super::guiding::learn_guide;
-use super::initial_bandwidth::InitialBandwidth;
-use super::initial_bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
 use super::survival::{CameraSurvival, LightSurvival, PhotonSurvival};
 use crate::camera::{Camera, GROUP_SIZE, TilePixel};
 use crate::estimator::level_factor2;
@@ -26,6 +24,8 @@ use crate::math::{Rgb, Vec3};
 use crate::path_class::{Part, PathClass};
 use crate::photon::PhotonMap;
 use crate::random::{Domain, Streams};
+use crate::render::initial_bandwidth::InitialBandwidth;
+use crate::render::initial_bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
 use crate::render::settings::{Counts, Settings};
 use crate::scene::Scene;
 use crate::spectrum::IterationWavelengths;

@@ -2,8 +2,6 @@
 //! pilot.
 
 use super::guiding::{guide_at, learn_guide};
-use super::initial_bandwidth::InitialBandwidth;
-use super::initial_bandwidth::{initial_bandwidths, initial_volume_bandwidths, median_radius2};
 use super::integrator::Work;
 use super::light_path_ranges::light_path_ranges;
 use super::region::region;
@@ -13,6 +11,8 @@ use crate::light::{Guide, Region};
 use crate::photon::{Kind, PhotonMap, kind};
 use crate::random::Domain;
 use crate::render::clock::{Phases, cpu_seconds};
+use crate::render::initial_bandwidth::InitialBandwidth;
+use crate::render::initial_bandwidth::{initial_bandwidths, initial_volume_bandwidths, median_radius2};
 use crate::render::input::RenderInput;
 use crate::render::settings::Settings;
 use crate::scene::Scene;

@@ -3,12 +3,12 @@
 //!
 //! In media all methods follow the memoryless rule of volumes.
 
-use super::initial_bandwidth::InitialBandwidth;
 use crate::estimator::rule::CountingRule;
 use crate::estimator::{PixelAccumulator, Schedule, level_factor2};
 use crate::math::{Frame, Vec3};
 use crate::photon::{ByKind, Kind, PhotonMap};
 use crate::processor::prefetch;
+use crate::render::initial_bandwidth::InitialBandwidth;
 use crate::render::settings::Settings;
 use crate::transport::{FoundPhotons, GatherBandwidths, LevelRadii, PhotonCounter};
 use rayon::prelude::*;

@@ -11,8 +11,6 @@
 //! When memory is full, tracing ends with the last light path whose photons all fit, and fluxes are divided by the
 //! number of traced paths.
 
-use super::initial_bandwidth::InitialBandwidth;
-use super::initial_bandwidth::{MIN_RADIUS_RATIO, SCREEN_CAP, picture_width_at};
 use super::integrator::{Integrator, Work};
 use super::photon_tracer::trace_range;
 use super::sample_buffer::{self, SampleBuffer};
@@ -23,6 +21,8 @@ use crate::photon::{ByKind, Kernel, Kind, MAX_NEIGHBOURS, Nearest, Photon, Photo
 use crate::random::{Domain, Streams};
 use crate::render::clock::Phases;
 use crate::render::clock::cpu_seconds;
+use crate::render::initial_bandwidth::InitialBandwidth;
+use crate::render::initial_bandwidth::{MIN_RADIUS_RATIO, SCREEN_CAP, picture_width_at};
 use crate::render::input::RenderInput;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
