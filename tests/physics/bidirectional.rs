@@ -104,6 +104,7 @@ fn furnace_box() {
 
 /// The irradiance under a uniform sphere is that of a point light at its centre: pi L R^2 / d^2.
 #[test]
+#[ignore = "long"]
 fn sphere_light_over_a_plane() {
     let (rho, radiance, radius, height) = (0.5, 4.0, 0.5, 1.0);
     let mut description = Description::default();

@@ -261,6 +261,7 @@ fn a_glass_block_that_slides_on_the_floor_is_blurred() {
 }
 
 #[test]
+#[ignore = "long"]
 fn guided_light_paths_follow_moving_glass_and_lights() {
     check_guided(Method::Vcm, 0.03);
 }
