@@ -3,8 +3,8 @@
 use crate::{Folder, values};
 use std::path::Path;
 
-/// Methods of which each samples light in a way of its own.
-const METHODS: [&str; 4] = ["path", "bdpt", "vcm", "sppm"];
+/// Methods of which each samples light in a way of its own, with options.
+const METHODS: [&str; 4] = ["path", "bdpt", "vcm", "sppm --photons 40000"];
 /// A shutter that is open for all of the animation.
 const OPEN: &str = "--frames 0 --frame-rate 1 --shutter 0,1";
 
