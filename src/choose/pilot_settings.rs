@@ -5,8 +5,7 @@ use crate::film::Size;
 use crate::finish::window;
 use crate::math::DVec3;
 use crate::photon::MAX_NEIGHBOURS;
-use crate::render::InitialBandwidth;
-use crate::render::{Levels, Settings, Shard};
+use crate::render::{InitialBandwidth, Levels, Settings, Shard};
 use crate::stat::median;
 use crate::transport::MAX_LEVELS;
 

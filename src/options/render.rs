@@ -16,11 +16,10 @@ use crate::estimator::rule::volume::ALPHA as VOLUME_ALPHA;
 use crate::finish::{DenoiserChoice, Finish};
 use crate::photon::Kernel;
 use crate::pipeline::{AutoRequest, MethodRequest, PictureRequest, with_light_paths};
-use crate::render::InitialBandwidth;
-use crate::render::SCREEN_CAP;
 use crate::render::{
-    BandwidthRule, Candidate, Counts, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, LIGHT_PATH_STEPS,
-    Levels, MAX_CONNECTIONS, MAX_LIGHT_PATHS_PER_PIXEL, Method, PHOTON_BYTES, RadiusRule, Settings, Shard,
+    BandwidthRule, Candidate, Counts, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, InitialBandwidth,
+    LIGHT_PATH_STEPS, Levels, MAX_CONNECTIONS, MAX_LIGHT_PATHS_PER_PIXEL, Method, PHOTON_BYTES, RadiusRule, SCREEN_CAP,
+    Settings, Shard,
 };
 use crate::scene::{CameraRequest, MAX_SIZE, Orbit};
 use crate::stat::sum::MAX_TERMS;

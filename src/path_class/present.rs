@@ -1,7 +1,6 @@
 //! Path classes that are possible in a scene.
 
-use super::Effect;
-use super::{ClassSet, PathClass};
+use super::{ClassSet, Effect, PathClass};
 use crate::scene::Survey;
 
 /// Path classes that are possible in a scene with this survey of its contents.

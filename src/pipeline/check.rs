@@ -1,16 +1,13 @@
 //! The second step: whether a request fits its scene and the memory, found before anything is rendered.
 
-use super::finish;
-use super::layers;
 use super::memory::MemoryCheck;
 use super::request::{MethodRequest, PictureRequest, Request};
+use super::{finish, layers};
 use crate::camera::Camera;
 use crate::error::{Error, ErrorKind, Result};
 use crate::plan::Search;
-use crate::render::InitialBandwidth;
-use crate::render::MIN_USER_RADIUS_RATIO;
 use crate::render::output::layer_shape;
-use crate::render::{Candidate, Settings};
+use crate::render::{Candidate, InitialBandwidth, MIN_USER_RADIUS_RATIO, Settings};
 use crate::scene::{Scene, View};
 use crate::transport::Indirect;
 use std::path::Path;

@@ -1,7 +1,6 @@
 //! The techniques that a method combines, and the effects that they find.
 
-use crate::path_class::Effect;
-use crate::path_class::{ClassSet, PathClass};
+use crate::path_class::{ClassSet, Effect, PathClass};
 use crate::scene::{Scene, Survey};
 
 /// Combination of techniques by which a method finds light.

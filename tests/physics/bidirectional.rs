@@ -9,8 +9,7 @@ use crate::support;
 
 use caustique::material::{Alpha, Material, MediumParameters};
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
-use caustique::render::InitialBandwidth;
-use caustique::render::{Counts, Levels, Method, Rendered, Settings, Shard};
+use caustique::render::{Counts, InitialBandwidth, Levels, Method, Rendered, Settings, Shard};
 use caustique::scene::description::{
     EnvironmentDescription, EnvironmentSource, Projection, PunctualKind, PunctualLight,
 };

@@ -10,8 +10,7 @@ use crate::support;
 
 use caustique::material::{Input, Material};
 use caustique::math::{DVec3, Rgb, Vec2, Vec3, Vec4};
-use caustique::render::InitialBandwidth;
-use caustique::render::{Control, Method, Settings, render};
+use caustique::render::{Control, InitialBandwidth, Method, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
 use caustique::texture::{Texels, Texture, TextureRef, Wrap};

@@ -8,8 +8,7 @@ use crate::support;
 
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
-use caustique::render::InitialBandwidth;
-use caustique::render::{Control, Levels, Method, Settings, render};
+use caustique::render::{Control, InitialBandwidth, Levels, Method, Settings, render};
 use caustique::scene::Description;
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, point_light, quad, sphere, square};

@@ -8,8 +8,7 @@ use crate::support;
 
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec3};
-use caustique::render::InitialBandwidth;
-use caustique::render::{Control, Levels, Method, Settings, render};
+use caustique::render::{Control, InitialBandwidth, Levels, Method, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, sphere, square};

@@ -8,8 +8,9 @@
 use crate::support;
 
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
-use caustique::render::InitialBandwidth;
-use caustique::render::{Control, Levels, Method, PHOTON_BYTES, Rendered, Settings, Shard, photons_per_path, render};
+use caustique::render::{
+    Control, InitialBandwidth, Levels, Method, PHOTON_BYTES, Rendered, Settings, Shard, photons_per_path, render,
+};
 use caustique::scene::description::{PunctualKind, PunctualLight};
 use caustique::scene::{Description, Scene};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, square};

@@ -5,9 +5,9 @@ use crate::support;
 use caustique::estimator::PixelAccumulator;
 use caustique::finish::{DenoiserChoice, Finish};
 use caustique::math::{DVec3, Vec3};
-use caustique::render::InitialBandwidth;
 use caustique::render::{
-    Accuracy, Levels, Method, RenderInput, Rendered, Session, Settings, Shard, ShardResult, StopReason,
+    Accuracy, InitialBandwidth, Levels, Method, RenderInput, Rendered, Session, Settings, Shard, ShardResult,
+    StopReason,
 };
 use caustique::scene::{Description, Scene};
 use support::scenes::{add, build, cuboid, glass, lit_room, look_at, matte, point_light, quad, sphere, square};

@@ -8,8 +8,7 @@
 use super::scenes::{add, build, look_at, matte, mirror, point_light, quad};
 use caustique::estimator::PixelAccumulator;
 use caustique::math::{DVec3, Vec3};
-use caustique::render::InitialBandwidth;
-use caustique::render::{Levels, Settings};
+use caustique::render::{InitialBandwidth, Levels, Settings};
 use caustique::scene::description::Projection;
 use caustique::scene::{CameraRequest, Description, Scene};
 use std::f64::consts::PI;

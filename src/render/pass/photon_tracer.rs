@@ -11,8 +11,9 @@ use crate::light::{Guide, Region};
 use crate::photon::{Kind, PhotonMap, kind};
 use crate::random::Domain;
 use crate::render::clock::{Phases, cpu_seconds};
-use crate::render::initial_bandwidth::InitialBandwidth;
-use crate::render::initial_bandwidth::{initial_bandwidths, initial_volume_bandwidths, median_radius2};
+use crate::render::initial_bandwidth::{
+    InitialBandwidth, initial_bandwidths, initial_volume_bandwidths, median_radius2,
+};
 use crate::render::input::RenderInput;
 use crate::render::settings::Settings;
 use crate::scene::Scene;

@@ -7,9 +7,8 @@ use crate::support::tiles::{SIZE, TILES, average, disagreeing, tiles};
 use caustique::estimator::Parts;
 use caustique::math::DVec3;
 use caustique::path_class::{ClassSet, Effect, EffectSet};
-use caustique::render::InitialBandwidth;
 use caustique::render::output::layer_shape;
-use caustique::render::{Control, Levels, Method, Rendered, Settings, render};
+use caustique::render::{Control, InitialBandwidth, Levels, Method, Rendered, Settings, render};
 use caustique::scene::Scene;
 use caustique::transport::Indirect;
 
