@@ -1,5 +1,5 @@
 //! Counted cost of an iteration: numbers of vertices times constants. The constants are core-seconds, fitted on one
-//! machine by `scripts/lab.sh cost`; choices depend on their ratios only.
+//! machine by `cargo bench --bench cost`; choices depend on their ratios only.
 
 use crate::camera::Camera;
 use crate::light::Guide;
