@@ -50,7 +50,7 @@ impl Input<Rgb> {
     }
 }
 
-/// What all inputs have in common.
+/// An input of any type.
 pub(super) trait AnyInput {
     fn texture(&self) -> &Option<TextureRef>;
 

@@ -119,11 +119,12 @@ pub struct Material {
     pub dispersion: f32,
 }
 
-/// The inputs of a material that affect its interface, given by `&self` or `&mut self`: all but metalness and
-/// transmission, the shares of what is below the interface.
-macro_rules! interface_inputs {
+/// All inputs of a material, given by `&self` or `&mut self`. The first [`SHARES`] do not affect the interface.
+macro_rules! inputs {
     ($($material:tt)+) => {
         [
+            $($material)+.metallic,
+            $($material)+.transmission,
             $($material)+.diffuse_roughness,
             $($material)+.roughness,
             $($material)+.diffuse_transmission,
@@ -142,17 +143,14 @@ macro_rules! interface_inputs {
     };
 }
 
-impl Material {
-    /// The inputs that affect the interface.
-    fn interface_inputs(&self) -> impl Iterator<Item = &dyn AnyInput> {
-        let inputs: [&dyn AnyInput; _] = interface_inputs!(&self);
-        inputs.into_iter()
-    }
+/// Number of inputs that are shares of what is below the interface.
+const SHARES: usize = 2;
 
+impl Material {
     /// References to the textures that the material uses.
     pub fn textures(&self) -> impl Iterator<Item = TextureRef> {
-        let shares: [&dyn AnyInput; _] = [&self.metallic, &self.transmission];
-        let inputs = self.interface_inputs().chain(shares).filter_map(|input| *input.texture());
+        let inputs: [&dyn AnyInput; _] = inputs!(&self);
+        let inputs = inputs.into_iter().filter_map(|input| *input.texture());
         let maps = [self.normal_texture, self.clearcoat_normal_texture].into_iter().flatten().map(|(map, _)| map);
         let others = [self.base_color_texture, self.emission_texture, self.anisotropy_texture];
         inputs.chain(others.into_iter().flatten()).chain(maps)
@@ -160,9 +158,8 @@ impl Material {
 
     /// The references to textures, to change them.
     pub fn textures_mut(&mut self) -> impl Iterator<Item = &mut TextureRef> {
-        let inputs: [&mut dyn AnyInput; _] = interface_inputs!(&mut self);
-        let shares: [&mut dyn AnyInput; _] = [&mut self.metallic, &mut self.transmission];
-        let inputs = inputs.into_iter().chain(shares).filter_map(|input| input.texture_mut().as_mut());
+        let inputs: [&mut dyn AnyInput; _] = inputs!(&mut self);
+        let inputs = inputs.into_iter().filter_map(|input| input.texture_mut().as_mut());
         let maps = [&mut self.normal_texture, &mut self.clearcoat_normal_texture].into_iter().flatten();
         let others = [&mut self.base_color_texture, &mut self.emission_texture, &mut self.anisotropy_texture];
         inputs.chain(others.into_iter().flatten()).chain(maps.map(|(map, _)| map))
@@ -170,7 +167,8 @@ impl Material {
 
     /// Whether no texture affects the interface, so that all surfaces of the material can share one.
     pub fn has_plain_interface(&self) -> bool {
-        self.anisotropy_texture.is_none() && self.interface_inputs().all(|input| input.texture().is_none())
+        let inputs: [&dyn AnyInput; _] = inputs!(&self);
+        self.anisotropy_texture.is_none() && inputs[SHARES..].iter().all(|input| input.texture().is_none())
     }
 
     /// Multiplies the factors by the means of their textures and removes the textures. `keep_alpha`: the base colour's
@@ -181,9 +179,8 @@ impl Material {
         if let Some(texture) = self.clearcoat_ior.texture.take() {
             self.clearcoat_ior.factor = 1.0 + (self.clearcoat_ior.factor - 1.0) * mean(texture).x;
         }
-        let inputs: [&mut dyn AnyInput; _] = interface_inputs!(&mut self);
-        let shares: [&mut dyn AnyInput; _] = [&mut self.metallic, &mut self.transmission];
-        for input in inputs.into_iter().chain(shares) {
+        let inputs: [&mut dyn AnyInput; _] = inputs!(&mut self);
+        for input in inputs {
             if let Some(texture) = input.texture_mut().take() {
                 input.multiply(mean(texture));
             }
