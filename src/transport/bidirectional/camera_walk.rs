@@ -1,5 +1,12 @@
 //! Camera paths of the bidirectional methods, given a light path and the photons of the previous iteration.
 
+use super::light_vertex::LightVertex;
+use super::light_walk::{add, scatter};
+use super::mis::{self, End, Merges, MisState, NextEventPdfs, Ratios, one_merge};
+use super::path_history::PathHistory;
+use super::photon_merge::{Merge, MergePhoton};
+use super::shares::{Connection, Incident, PathHalves, connection_shares, shares, wanted};
+use super::{Bidirectional, MergeLevels, PathKind, PathRecorder, Technique};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::light::{EmissionDensity, Group, Receiver};
 use crate::math::{Rgb, Vec3, is_lit};
@@ -8,13 +15,6 @@ use crate::path_class::{LightPrefix, Part, PathClass};
 use crate::photon::PhotonMap;
 use crate::random::{Purpose, Stream, mix};
 use crate::stop::Stop;
-use crate::transport::bidirectional::light_vertex::LightVertex;
-use crate::transport::bidirectional::light_walk::{add, scatter};
-use crate::transport::bidirectional::mis::{self, End, Merges, MisState, NextEventPdfs, Ratios, one_merge};
-use crate::transport::bidirectional::path_history::PathHistory;
-use crate::transport::bidirectional::photon_merge::{Merge, MergePhoton};
-use crate::transport::bidirectional::shares::{Connection, Incident, PathHalves, connection_shares, shares, wanted};
-use crate::transport::bidirectional::{Bidirectional, MergeLevels, PathKind, PathRecorder, Technique};
 use crate::transport::walk::camera_paths::CameraPaths;
 use crate::transport::walk::cause::Cause;
 use crate::transport::walk::interior::{Interior, Presence};
@@ -22,7 +22,7 @@ use crate::transport::walk::lobe_layers::{FirstScatter, LobeHistory};
 use crate::transport::walk::pass_through::{BulbHit, PassThroughHit};
 use crate::transport::walk::pixel_sample::{Features, PixelSample};
 use crate::transport::walk::scattering_vertex::ScatterPoint;
-use crate::transport::walk::segment::{Destination, FirstHit, token, with_camera_bit};
+use crate::transport::walk::segment::{Destination, FirstHit, with_camera_bit};
 use crate::transport::walk::vertex::{MediumLight, MediumVertex, Next, Scattered, Vertex, Visitor};
 use crate::transport::walk::{PathStart, walk};
 use bumpalo::Bump;
@@ -169,24 +169,18 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
     #[inline]
     fn next_event<S: ScatterPoint>(&mut self, vertex: &S) {
         let CameraPaths { scene, classes, .. } = self.shared.camera_paths;
-        let draws = vertex.draws();
         let halves = PathHalves { suffix: self.history.suffix, prefix: LightPrefix::start(false) };
         if !wanted(vertex, halves, classes) {
             return;
         }
-        let (choice, point) = (draws.one_fine(Purpose::LightChoice), draws.two(Purpose::LightPoint));
-        let Some(light) =
-            scene.lights.sample_direct(&scene.shapes, &scene.materials, &vertex.receiver(), choice, point)
-        else {
-            return;
-        };
+        let Some(light) = vertex.sample_light(scene) else { return };
         let (f, pdf) = vertex.evaluate_cos(light.wi, Transport::Radiance, LobeSet::ALL);
         let value = vertex.throughput() * f * light.radiance / light.pdf_w;
         let technique = Technique::NextEvent { camera: vertex.depth() };
         if !self.finds(technique, value) {
             return;
         }
-        let visibility = vertex.shadow_ray_to_light(scene, &light, token(scene, draws, Purpose::ShadowAlpha));
+        let visibility = vertex.shadow_ray_to_light(scene, &light);
         if !is_lit(visibility.transmittance) {
             return;
         }

@@ -3,19 +3,19 @@
 //! It shares the walk with the other methods, but computes its own weights of two techniques, over all lobes of a
 //! vertex at once (`direct_light` treats two sets of lobes), so that tests can compare the two.
 
+use super::camera_walk::{record_medium, record_surface};
+use super::path_history::PathHistory;
+use super::shares::{Incident, PathHalves, shares, wanted};
+use super::{PathKind, PathRecorder, Technique};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::light::{Group, Receiver};
 use crate::math::{Rgb, Vec3, is_lit};
 use crate::medium::FlightDensity;
 use crate::path_class::{ClassSet, LightPrefix, Part};
-use crate::random::{Purpose, Stream};
+use crate::random::Stream;
 use crate::scene::Scene;
 use crate::stop::Stop;
 use crate::trace::Tracer;
-use crate::transport::bidirectional::camera_walk::{record_medium, record_surface};
-use crate::transport::bidirectional::path_history::PathHistory;
-use crate::transport::bidirectional::shares::{Incident, PathHalves, shares, wanted};
-use crate::transport::bidirectional::{PathKind, PathRecorder, Technique};
 use crate::transport::walk::camera_paths::CameraPaths;
 use crate::transport::walk::cause::Cause;
 use crate::transport::walk::direct::caught_light;
@@ -24,7 +24,6 @@ use crate::transport::walk::pass_through::{BulbHit, PassThroughHit};
 use crate::transport::walk::pixel_sample::PixelSample;
 use crate::transport::walk::roulette::SPARED_BY_ROULETTE;
 use crate::transport::walk::scattering_vertex::ScatterPoint;
-use crate::transport::walk::segment::token;
 use crate::transport::walk::vertex::{MediumLight, MediumVertex, Next, Scattered, Vertex, Visitor};
 use crate::transport::walk::{PathStart, walk};
 use bumpalo::Bump;
@@ -60,22 +59,17 @@ impl<R: PathRecorder> PathTracer<'_, R> {
 
     /// Adds next-event estimation at a vertex of the path.
     fn lit<S: ScatterPoint>(&mut self, vertex: &S) {
-        let (scene, draws) = (self.scene, vertex.draws());
+        let scene = self.scene;
         let halves = PathHalves { suffix: self.history.suffix, prefix: LightPrefix::start(false) };
         if vertex.depth() >= self.max_depth || !wanted(vertex, halves, self.classes) {
             return;
         }
-        let (choice, point) = (draws.one_fine(Purpose::LightChoice), draws.two(Purpose::LightPoint));
-        let Some(light) =
-            scene.lights.sample_direct(&scene.shapes, &scene.materials, &vertex.receiver(), choice, point)
-        else {
-            return;
-        };
+        let Some(light) = vertex.sample_light(scene) else { return };
         let (f, pdf) = vertex.evaluate_cos(light.wi, Transport::Radiance, LobeSet::ALL);
         if (f * light.radiance).max_element() <= 0.0 {
             return;
         }
-        let visibility = vertex.shadow_ray_to_light(scene, &light, token(scene, draws, Purpose::ShadowAlpha));
+        let visibility = vertex.shadow_ray_to_light(scene, &light);
         if !is_lit(visibility.transmittance) {
             return;
         }

@@ -7,15 +7,15 @@
 //! onward lobes is the path itself, which continues with probability `survival`. A technique that is used with
 //! probability n has density n p in the balance heuristic.
 
+use super::lobe_layers::FirstScatter;
+use super::pass_through::for_each_pass_through_light;
+use super::scattering_vertex::ScatterPoint;
+use super::segment::{End, Start, next_surface, token};
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3, is_lit};
 use crate::random::Purpose;
 use crate::scene::Scene;
 use crate::trace::{Ray, Tracer};
-use crate::transport::walk::lobe_layers::FirstScatter;
-use crate::transport::walk::pass_through::for_each_pass_through_light;
-use crate::transport::walk::scattering_vertex::ScatterPoint;
-use crate::transport::walk::segment::{End, Start, next_surface, token};
 
 /// Probability of tracing a BSDF sample of the gathering lobes. They are broad, so the light sample is nearly always
 /// the better one; the BSDF sample bounds the error near large lights. One in sixteen instead of one in eight changes
@@ -82,13 +82,7 @@ pub(in crate::transport) fn next_event(
     sets: [(LobeSet, f32); 2],
     lobes: Division<'_>,
 ) -> Rgb {
-    let draws = vertex.draws();
-    let choice = draws.one_fine(Purpose::LightChoice);
-    let point = draws.two(Purpose::LightPoint);
-    let Some(sample) = scene.lights.sample_direct(&scene.shapes, &scene.materials, &vertex.receiver(), choice, point)
-    else {
-        return Rgb::ZERO;
-    };
+    let Some(sample) = vertex.sample_light(scene) else { return Rgb::ZERO };
     let mut scattered = Rgb::ZERO;
     for (set, probability) in sets {
         // Delta lobes scatter nothing towards a light sample, but the density of the set accounts for them.
@@ -106,8 +100,7 @@ pub(in crate::transport) fn next_event(
     if !is_lit(arriving) {
         return Rgb::ZERO;
     }
-    let token = token(scene, draws, Purpose::ShadowAlpha);
-    let left = vertex.shadow_ray_to_light(scene, &sample, token).transmittance;
+    let left = vertex.shadow_ray_to_light(scene, &sample).transmittance;
     // Infinite light behind an occluder would give NaN.
     if !is_lit(left) {
         return Rgb::ZERO;
@@ -126,18 +119,13 @@ pub(in crate::transport) fn next_event(
 /// Direct light at a vertex on a shadow catcher, with the shadows of all objects and with those of catchers alone, both
 /// by the same sample of a light.
 pub(in crate::transport) fn caught_light(scene: &Scene, vertex: &impl ScatterPoint, catchers: &Tracer) -> [Rgb; 2] {
-    let draws = vertex.draws();
-    let (choice, point) = (draws.one_fine(Purpose::LightChoice), draws.two(Purpose::LightPoint));
-    let Some(light) = scene.lights.sample_direct(&scene.shapes, &scene.materials, &vertex.receiver(), choice, point)
-    else {
-        return [Rgb::ZERO; 2];
-    };
+    let Some(light) = vertex.sample_light(scene) else { return [Rgb::ZERO; 2] };
     let (f, _) = vertex.evaluate_cos(light.wi, Transport::Radiance, LobeSet::ALL);
     let arriving = vertex.throughput() * f * light.radiance / light.pdf_w;
     if !(is_lit(arriving) && arriving.is_finite()) {
         return [Rgb::ZERO; 2];
     }
-    let token = token(scene, draws, Purpose::ShadowAlpha);
+    let token = token(scene, vertex.draws(), Purpose::ShadowAlpha);
     let origin = vertex.ray_origin(light.wi);
     let (direction, tmax) = match light.target {
         None => (light.wi, f32::INFINITY),
@@ -146,7 +134,7 @@ pub(in crate::transport) fn caught_light(scene: &Scene, vertex: &impl ScatterPoi
     if catchers.occluded(&Ray { origin, direction, tmax, token }) {
         return [Rgb::ZERO; 2];
     }
-    [arriving * vertex.shadow_ray_to_light(scene, &light, token).transmittance, arriving]
+    [arriving * vertex.shadow_ray_to_light(scene, &light).transmittance, arriving]
 }
 
 #[inline]

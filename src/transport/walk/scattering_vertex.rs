@@ -1,19 +1,19 @@
 //! Common interface of surface and medium vertices, for next-event estimation and connections.
 
+use super::interior::Interior;
+use super::lobe_layers::FirstScatter;
+use super::roulette::survival;
+use super::segment::{Destination, ShadowRay, Start, Visibility, shadow_ray, token};
+use super::vertex::{MediumVertex, Vertex};
 use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use crate::light::{DirectSample, Emitter, Receiver, VolumeLight};
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::medium::HenyeyGreenstein;
-use crate::random::Draws;
+use crate::random::{Draws, Purpose};
 use crate::scene::Scene;
 use crate::scene::contact::{self, ContactPoint};
 use crate::spectrum::Wavelength;
 use crate::trace::Ray;
-use crate::transport::walk::interior::Interior;
-use crate::transport::walk::lobe_layers::FirstScatter;
-use crate::transport::walk::roulette::survival;
-use crate::transport::walk::segment::{Destination, ShadowRay, Start, Visibility, shadow_ray};
-use crate::transport::walk::vertex::{MediumVertex, Vertex};
 
 /// A vertex of a walk, on a surface or in a medium. In a medium the cosine is 1, and the phase function counts as a
 /// broad lobe.
@@ -81,9 +81,18 @@ pub trait ScatterPoint {
         self.shadow_ray_to(scene, wi, target, token, (false, None), Destination::Any)
     }
 
-    /// Traces a shadow ray to a sampled light.
+    /// Samples a light for next-event estimation.
     #[inline]
-    fn shadow_ray_to_light(&self, scene: &Scene, light: &DirectSample, token: u32) -> Visibility {
+    fn sample_light(&self, scene: &Scene) -> Option<DirectSample> {
+        let draws = self.draws();
+        let (choice, point) = (draws.one_fine(Purpose::LightChoice), draws.two(Purpose::LightPoint));
+        scene.lights.sample_direct(&scene.shapes, &scene.materials, &self.receiver(), choice, point)
+    }
+
+    /// Traces a shadow ray to a light of [`ScatterPoint::sample_light`].
+    #[inline]
+    fn shadow_ray_to_light(&self, scene: &Scene, light: &DirectSample) -> Visibility {
+        let token = token(scene, self.draws(), Purpose::ShadowAlpha);
         let reaching = light.target.and_then(|target| ContactPoint::on_light(scene, light.light, target));
         let destination = match scene.lights.emitters().get(light.light as usize) {
             Some(Emitter::Volume(VolumeLight { instance, .. })) if scene.survey.fire => Destination::Inside(*instance),
