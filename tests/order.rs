@@ -171,7 +171,8 @@ fn given(text: &str) -> Vec<String> {
     let kinds = ["fn ", "const fn ", "struct ", "enum ", "trait ", "type ", "const ", "static "];
     let name = |line: &str| {
         let line = line.strip_prefix("pub")?;
-        let line = line.strip_prefix("(super)").unwrap_or(line).trim_start();
+        let line =
+            line.strip_prefix('(').and_then(|line| line.split_once(')')).map_or(line, |(_, rest)| rest).trim_start();
         let rest = kinds.iter().rev().find_map(|kind| line.strip_prefix(kind))?;
         Some(rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>())
     };

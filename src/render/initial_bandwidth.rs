@@ -39,7 +39,7 @@ const NEIGHBOURHOOD: usize = 3;
 pub enum InitialBandwidth {
     /// Distance to the k-th nearest photon of the pilot iteration, which runs before the first one.
     Nearest(usize),
-    /// Three times the width of a pixel at the gathering point.
+    /// [`FOOTPRINT_PIXELS`] times the width of a pixel at the gathering point.
     Footprint,
     /// One radius for all pixels (scene units).
     Fixed(f32),

@@ -2,7 +2,7 @@
 
 use crate::support;
 
-mod diagnosis;
+mod advice;
 mod presence;
 mod switch;
 

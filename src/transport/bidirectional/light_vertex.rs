@@ -1,5 +1,6 @@
 //! Vertices of light paths to which camera vertices are connected.
 
+use super::mis::MisState;
 use crate::bsdf::{LobeSet, Shading, Transport};
 use crate::geometry::Surface;
 use crate::light::Group;
@@ -7,7 +8,6 @@ use crate::math::{Rgb, Vec3};
 use crate::medium::HenyeyGreenstein;
 use crate::path_class::LightPrefix;
 use crate::scene::contact::ContactPoint;
-use crate::transport::bidirectional::mis::MisState;
 use crate::transport::walk::interior::Presence;
 
 /// Scattering at a light vertex.

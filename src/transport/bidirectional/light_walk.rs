@@ -1,5 +1,10 @@
 //! Light paths of the bidirectional methods.
 
+use super::light_vertex::{LightVertex, Scatterer};
+use super::mis::{self, Merges, MisState, Ratios};
+use super::photon_merge::MergePhoton;
+use super::shares::{Incident, PathHalves, shares, wanted};
+use super::{Bidirectional, MergeLevels, PathRecorder, Technique};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::light::{Group, Receiver};
 use crate::math::{Rgb, is_lit};
@@ -7,11 +12,6 @@ use crate::medium::FlightDensity;
 use crate::path_class::{CameraSuffix, Event, LightPrefix, Part, PathClass};
 use crate::random::Purpose;
 use crate::stop::Stop;
-use crate::transport::bidirectional::light_vertex::{LightVertex, Scatterer};
-use crate::transport::bidirectional::mis::{self, Merges, MisState, Ratios};
-use crate::transport::bidirectional::photon_merge::MergePhoton;
-use crate::transport::bidirectional::shares::{Incident, PathHalves, shares, wanted};
-use crate::transport::bidirectional::{Bidirectional, MergeLevels, PathRecorder, Technique};
 use crate::transport::light::{Emitted, LightPaths};
 use crate::transport::walk::cause::Cause;
 use crate::transport::walk::interior::Presence;

@@ -17,11 +17,11 @@ pub(in crate::transport) mod shares;
 use crate::light::Group;
 use crate::math::{Rgb, Vec3};
 use crate::path_class::PathClass;
-use crate::transport::bidirectional::mis::{Eta, Merges, Ratios, one_merge};
 use crate::transport::walk::camera_paths::CameraPaths;
 use crate::transport::walk::cause::Cause;
 use crate::transport::walk::initial_media::InitialMedia;
 use crate::transport::walk::lobe_layers::FirstScatter;
+use mis::{Eta, Merges, Ratios, one_merge};
 
 /// The sampling techniques that a bidirectional method combines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

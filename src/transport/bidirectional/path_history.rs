@@ -1,8 +1,8 @@
 //! The history of a camera path, which determines the class of the light that it finds.
 
+use super::shares::leads;
 use crate::bsdf::LobeSet;
 use crate::path_class::{CameraSuffix, ClassSet, Event};
-use crate::transport::bidirectional::shares::leads;
 use crate::transport::walk::pixel_sample::BranchFeatures;
 
 /// Class, lobes and length of a camera path up to its last vertex.

@@ -1,14 +1,14 @@
 //! Merging of photons with multiple importance sampling.
 
+use super::mis::{self, Merges, MisState};
+use super::shares::PhotonShares;
+use super::{MergeLevels, PathKind, PathRecorder, Technique};
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::Group;
 use crate::math::{Rgb, Vec3, is_lit};
 use crate::path_class::{CameraSuffix, ClassSet, LightPrefix, PathClass};
 use crate::photon::{Located, PhotonMap, same_surface};
 use crate::spectrum::Band;
-use crate::transport::bidirectional::mis::{self, Merges, MisState};
-use crate::transport::bidirectional::shares::PhotonShares;
-use crate::transport::bidirectional::{MergeLevels, PathKind, PathRecorder, Technique};
 use crate::transport::walk::interior::Presence;
 use crate::transport::walk::lobe_layers::{FirstScatter, LobeHistory};
 use crate::transport::walk::pixel_sample::INNER_AREAS;

@@ -6,10 +6,10 @@
 //! A path that samples all lobes at once continues with the class of the lobe that it sampled. So light that it hits is
 //! shared in proportion to densities, which nearly agree with the values of the lobes; the sum over classes is exact.
 
+use super::light_vertex::LightVertex;
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3};
 use crate::path_class::{CameraSuffix, ClassSet, Event, LightPrefix, PathClass};
-use crate::transport::bidirectional::light_vertex::LightVertex;
 use crate::transport::walk::scattering_vertex::ScatterPoint;
 
 /// The path classes (by kinds of bounces) that some light belongs to, and the fraction of the light in each, by

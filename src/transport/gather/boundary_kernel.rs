@@ -6,6 +6,7 @@
 //! radius r, a ray that is inside from a to b has the mass `int_a^b 3 t^2 K(t^2 / r^2) dt / r^3`, and the mean over all
 //! directions is the mass of the ball.
 
+use super::volume::Volume;
 use crate::geometry::Surface;
 use crate::math::{Frame, Vec3, sin_cos_turns, warp};
 use crate::photon::Kernel;
@@ -13,7 +14,6 @@ use crate::random::Purpose;
 use crate::scene::Scene;
 use crate::scene::contact::RaySurfaces;
 use crate::trace::{Hit, Ray};
-use crate::transport::gather::volume::Volume;
 use crate::transport::walk::interior::Interior;
 use crate::transport::walk::pixel_sample::MAX_LEVELS;
 use crate::transport::walk::segment::token;

@@ -18,6 +18,10 @@
 //! An X in a medium is treated as one with broad lobes only. Each segment has one in every medium that it crosses, and
 //! continues to the surface behind ([`crate::transport::walk::flight`]).
 
+use super::bandwidths::GatherBandwidths;
+use super::glint::{Glints, Onward};
+use super::photon_batch::{Scratch, Waiting};
+use super::volume::Volume;
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::light::{EmissionDensity, Receiver};
 use crate::math::{Rgb, Vec3};
@@ -28,10 +32,6 @@ use crate::random::Purpose;
 use crate::scene::Scene;
 use crate::stop::Stop;
 use crate::transport::bidirectional::shares::leads;
-use crate::transport::gather::bandwidths::GatherBandwidths;
-use crate::transport::gather::glint::{Glints, Onward};
-use crate::transport::gather::photon_batch::{Scratch, Waiting};
-use crate::transport::gather::volume::Volume;
 use crate::transport::walk::camera_paths::{CameraPathStart, CameraPaths, Indirect};
 use crate::transport::walk::cause::Cause;
 use crate::transport::walk::direct::{

@@ -14,11 +14,11 @@
 //! r is. Both sides must compute the same weight for a path, so both use e rounded down to a power of two
 //! ([`PhotonFlags::density`]).
 
+use super::bandwidths::LevelRadii;
 use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use crate::light::EmissionDensity;
 use crate::math::{Rgb, Vec3};
 use crate::photon::{Kernel, Photon, PhotonFlags, PhotonMap};
-use crate::transport::gather::bandwidths::LevelRadii;
 use crate::transport::walk::pixel_sample::MAX_LEVELS;
 use std::f32::consts::PI;
 

@@ -13,15 +13,15 @@ use crate::math::Rgb;
 use crate::path_class::{Event, LightPrefix, Part};
 use crate::photon::{Kind, Near, Photon, PhotonMap};
 use crate::spectrum::Wavelength;
-use crate::transport::gather::bandwidths::{FoundPhotons, GatherBandwidths, PhotonCounter};
-use crate::transport::gather::gathering_walk::GatheringWalk;
-use crate::transport::gather::glint::{GlintGather, Onward};
-use crate::transport::gather::lobe_gather::LobeGather;
-use crate::transport::gather::photon_batch::Batch;
 use crate::transport::walk::cause::Cause;
 use crate::transport::walk::interior::Presence;
 use crate::transport::walk::lobe_layers::FirstScatter;
 use crate::transport::walk::vertex::Vertex;
+use bandwidths::{FoundPhotons, GatherBandwidths, PhotonCounter};
+use gathering_walk::GatheringWalk;
+use glint::{GlintGather, Onward};
+use lobe_gather::LobeGather;
+use photon_batch::Batch;
 use std::f32::consts::FRAC_1_PI;
 
 impl<B: GatherBandwidths> GatheringWalk<'_, B> {

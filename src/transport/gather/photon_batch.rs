@@ -1,9 +1,9 @@
 //! Evaluation of the BSDF for photons at a vertex, eight at a time.
 
+use super::bandwidths::{FoundPhotons, PhotonCounter, first_lane};
 use crate::bsdf::{Gathering, LobeSet};
 use crate::math::{Rgb, Vec3};
 use crate::photon::{ByKind, Kernel, Near, Photon, PhotonFlags, VolumePhoton};
-use crate::transport::gather::bandwidths::{FoundPhotons, PhotonCounter, first_lane};
 use crate::transport::walk::lobe_layers::LobeRecord;
 use crate::transport::walk::pixel_sample::MAX_LEVELS;
 use crate::transport::walk::vertex::Vertex;

@@ -1,12 +1,12 @@
 //! Mean numbers of vertices of paths. The cost model of methods uses them instead of a clock.
 
+use super::LightPaths;
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::Guide;
 use crate::math::Vec3;
 use crate::photon::{Located, PhotonMap, same_surface};
 use crate::random::{Domain, Stream};
 use crate::scene::Scene;
-use crate::transport::light::LightPaths;
 use crate::transport::walk::camera_paths::{CameraPathStart, CameraPaths};
 use crate::transport::walk::initial_media::InitialMedia;
 use crate::transport::walk::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};

@@ -1,5 +1,9 @@
 //! The starts of camera paths, and what all camera paths of a render share.
 
+use super::PathStart;
+use super::initial_media::InitialMedium;
+use super::pixel_sample::PixelSample;
+use super::segment::{PrecomputedHit, camera_token};
 use crate::camera::{Camera, GROUP_SIZE, TilePixel};
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::path_class::{ClassSet, PathClass};
@@ -9,10 +13,6 @@ use crate::scene::Scene;
 use crate::spectrum::WavelengthSample;
 use crate::stop::Stop;
 use crate::trace::Ray;
-use crate::transport::walk::PathStart;
-use crate::transport::walk::initial_media::InitialMedium;
-use crate::transport::walk::pixel_sample::PixelSample;
-use crate::transport::walk::segment::{PrecomputedHit, camera_token};
 use serde::{Deserialize, Serialize};
 
 /// Technique for light that was scattered broadly before it arrives at the camera path's first broad bounce.

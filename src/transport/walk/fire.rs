@@ -4,12 +4,12 @@
 //! start from them. A camera path adds their light on the segments where no other technique can find it: before its
 //! first vertex, and behind perfect mirrors and clear glass.
 
+use super::segment::{Passage, PrecomputedHit, Span, Start, Through, next_vertex};
+use super::vertex::{MediumLight, Scattered, Visitor};
 use crate::math::Rgb;
 use crate::medium::GridRay;
 use crate::random::{Draws, HashSequence, Purpose, mix};
 use crate::scene::Scene;
-use crate::transport::walk::segment::{Passage, PrecomputedHit, Span, Start, Through, next_vertex};
-use crate::transport::walk::vertex::{MediumLight, Scattered, Visitor};
 
 /// Number of points on each part of a segment at which the emission is sampled.
 const SAMPLES: u32 = 4;

@@ -16,6 +16,9 @@
 //! these numbers both densities are known and the shares sum to one, so the estimate is unbiased however lights are
 //! chosen.
 
+use super::direct::balance;
+use super::segment::{MediumArrival, Passage, Span, Through};
+use super::vertex::{MediumVertex, Scattered, Visitor};
 use crate::math::{Rgb, Vec3};
 use crate::medium::{
     Collision, CollisionDistribution, Equiangular, FlightDensity, FlightOutcome, GridFlight, GridRay, Proxy,
@@ -23,9 +26,6 @@ use crate::medium::{
 use crate::random::{Draws, HashSequence, Purpose, mix};
 use crate::scene::Scene;
 use crate::spectrum::Wavelength;
-use crate::transport::walk::direct::balance;
-use crate::transport::walk::segment::{MediumArrival, Passage, Span, Through};
-use crate::transport::walk::vertex::{MediumVertex, Scattered, Visitor};
 
 /// The arrival at a collision in a medium, where it has `density`: 1 if the medium is homogeneous.
 fn arrival(scene: &Scene, span: &Span, collision: Collision, density: Option<f32>) -> MediumArrival {

@@ -1,10 +1,10 @@
 //! Initial media: the solids around the camera and around each light, where paths start.
 
+use super::interior::Interior;
 use crate::camera::Camera;
 use crate::light::{Emitter, Light, TriangleLight};
 use crate::math::{Vec3, bounding_box};
 use crate::scene::Scene;
-use crate::transport::walk::interior::Interior;
 use std::collections::HashMap;
 
 /// The solids around the points where paths from one camera or light start.

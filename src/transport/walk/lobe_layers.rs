@@ -5,9 +5,9 @@
 //! known direction is divided in proportion to the values of the lobes for this direction. A path that continues keeps the
 //! shares of the direction in which it continues. So the layers are exact, and sum to the picture in every channel.
 
+use super::vertex::Vertex;
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::math::Rgb;
-use crate::transport::walk::vertex::Vertex;
 
 /// A layer of light by the lobe of the first hit and by the number of bounces. The layers add up to the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

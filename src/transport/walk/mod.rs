@@ -26,17 +26,15 @@ use crate::scene::Scene;
 use crate::scene::contact::ContactPoint;
 use crate::spectrum::{SPREAD, Wavelength, WavelengthSample};
 use crate::stop::Stop;
-use crate::transport::walk::fire::MediumEmission;
-use crate::transport::walk::flight::{Fly, Split};
-use crate::transport::walk::interior::Interior;
-use crate::transport::walk::pass_through::{BulbHit, PassThroughHit, for_each_bulb, for_each_pass_through_light};
-use crate::transport::walk::roulette::{MIN_DISPERSED_SHARE, branch_share, late_survival};
-use crate::transport::walk::scattering_vertex::ScatterPoint;
-use crate::transport::walk::segment::{
-    Arrival, Attenuate, Clear, End, MediumArrival, PrecomputedHit, Start, camera_token, next_vertex, token,
-};
-use crate::transport::walk::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use bumpalo::Bump;
+use fire::MediumEmission;
+use flight::{Fly, Split};
+use interior::Interior;
+use pass_through::{BulbHit, PassThroughHit, for_each_bulb, for_each_pass_through_light};
+use roulette::{MIN_DISPERSED_SHARE, branch_share, late_survival};
+use scattering_vertex::ScatterPoint;
+use segment::{Arrival, Attenuate, Clear, End, MediumArrival, PrecomputedHit, Start, camera_token, next_vertex, token};
+use vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 
 /// Number of vertices between two checks whether a path must end early.
 pub const CUT_INTERVAL: u32 = 16;

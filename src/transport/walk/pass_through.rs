@@ -4,6 +4,7 @@
 //! behind. Light paths start from them, and next-event estimation samples them, as any other light. Shadow rays and
 //! light paths do not hit them. So all techniques sample the same paths with the same densities.
 
+use super::segment::{Destination, ShadowRay, Start, shadow_ray};
 use crate::geometry::Surface;
 use crate::light::Group;
 use crate::math::{Rgb, Vec3};
@@ -11,7 +12,6 @@ use crate::medium::FlightDensity;
 use crate::random::{Draws, Purpose};
 use crate::scene::Scene;
 use crate::trace::{Hit, Ray};
-use crate::transport::walk::segment::{Destination, ShadowRay, Start, shadow_ray};
 
 /// A segment of a camera path crosses a pass-through light, which emits but does not block rays.
 pub struct PassThroughHit {

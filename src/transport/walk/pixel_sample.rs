@@ -1,9 +1,9 @@
 //! The sample of one camera path: radiance by part and level, and the G-buffer.
 
+use super::cause::Cause;
+use super::segment::FirstHit;
 use crate::bsdf::LobeSet;
 use crate::math::{Rgb, Vec3};
-use crate::transport::walk::cause::Cause;
-use crate::transport::walk::segment::FirstHit;
 
 /// Largest number of bandwidth levels (gathering radii) of one camera path.
 pub const MAX_LEVELS: usize = 5;

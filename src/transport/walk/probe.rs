@@ -1,13 +1,13 @@
 //! The first vertex where a camera path gathers photons, and the contribution of a photon there.
 
+use super::camera_paths::CameraPaths;
+use super::direct::direct_light;
+use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
+use super::{PathStart, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3};
 use crate::photon::NO_NORMAL;
 use crate::random::Stream;
-use crate::transport::walk::camera_paths::CameraPaths;
-use crate::transport::walk::direct::direct_light;
-use crate::transport::walk::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
-use crate::transport::walk::{PathStart, walk};
 use bumpalo::Bump;
 use std::f32::consts::FRAC_1_PI;
 

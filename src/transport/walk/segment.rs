@@ -1,6 +1,7 @@
 //! Rays from one scattering vertex to the next, through alpha cut-outs (Embree skips them) and boundaries that do not
 //! scatter; and shadow rays.
 
+use super::interior::{Crossing, Interior, Presence, ior};
 use crate::geometry::Surface;
 use crate::material::MediumParameters;
 use crate::math::{Rgb, Vec3};
@@ -9,7 +10,6 @@ use crate::random::{Draws, HashSequence, Purpose, mix};
 use crate::scene::Scene;
 use crate::scene::contact::{self, ContactPoint, RaySurfaces};
 use crate::trace::{CAMERA_RAY_BIT, Hit, Ray};
-use crate::transport::walk::interior::{Crossing, Interior, Presence, ior};
 
 /// Largest number of boundaries without scattering that a path segment may cross, as between many drops of one liquid.
 /// More are taken for a numerical trap and end the path.

@@ -1,5 +1,10 @@
 //! Vertices of a path, and the visitor that receives them.
 
+use super::interior::{Interior, Presence};
+use super::pass_through::{BulbHit, PassThroughHit};
+use super::pixel_sample::Features;
+use super::roulette::survival;
+use super::segment::MediumArrival;
 use crate::bsdf::{BsdfSample, LobeSet, Shading};
 use crate::geometry::Surface;
 use crate::math::{Rgb, Vec3};
@@ -8,11 +13,6 @@ use crate::random::Draws;
 use crate::scene::Scene;
 use crate::spectrum::Wavelength;
 use crate::stop::Stop;
-use crate::transport::walk::interior::{Interior, Presence};
-use crate::transport::walk::pass_through::{BulbHit, PassThroughHit};
-use crate::transport::walk::pixel_sample::Features;
-use crate::transport::walk::roulette::survival;
-use crate::transport::walk::segment::MediumArrival;
 
 /// A vertex of a path on a surface. References with lifetime `'a` outlive the walk.
 pub struct Vertex<'v, 'a> {

@@ -1,12 +1,12 @@
 //! The surface that a pixel shows, for layers that take one point of each pixel.
 
+use super::camera_paths::CameraPaths;
+use super::vertex::{Next, Scattered, Vertex, Visitor};
+use super::walk;
 use crate::bsdf::{LobeSet, Transport};
 use crate::geometry::Surface;
 use crate::math::Vec2;
 use crate::random::{Domain, Streams};
-use crate::transport::walk::camera_paths::CameraPaths;
-use crate::transport::walk::vertex::{Next, Scattered, Vertex, Visitor};
-use crate::transport::walk::walk;
 use bumpalo::Bump;
 use smallvec::SmallVec;
 
