@@ -72,7 +72,7 @@ class Shared(unittest.TestCase):
         source = (support.ROOT / "src" / "peers" / "drivers.rs").read_text()
         # Modules for scripts alone: comparisons, conversions of scenes, the denoiser.
         others = {"__main__", "caller", "from_xml", "glb_package", "mitsuba_xml", "oidn", "tiles", "to_xml"}
-        others |= {"xml_colours", "xml_lights", "xml_materials", "xml_shapes"}
+        others |= {"xml_colours", "xml_grids", "xml_lights", "xml_materials", "xml_shapes"}
         for name in {path.stem for path in DRIVERS.glob("*.py")} - others:
             self.assertIn(f'"../../scripts/compare/peers/{name}.py"', source)
 

@@ -90,7 +90,8 @@ def png(name: str, texture) -> bytes:
 
 
 def coefficients(medium: Medium) -> dict:
-    return {"sigma_a": numbers(medium.sigma_a), "sigma_s": numbers(medium.sigma_s), "g": float(medium.g)}
+    found: dict = {"sigma_a": numbers(medium.sigma_a), "sigma_s": numbers(medium.sigma_s), "g": float(medium.g)}
+    return found if medium.density is None else {**found, "density": {"file": medium.density}}
 
 
 def numbers(values) -> list[float]:

@@ -35,7 +35,7 @@ def _are_numbers(value, shape: tuple) -> bool:
 
 @dataclass(kw_only=True)
 class Medium(Described):
-    """A homogeneous medium, such as water or fog, that absorbs and scatters light."""
+    """A medium, such as water, fog or smoke, that absorbs and scatters light."""
 
     #: Absorption coefficient, 1/m, per channel.
     sigma_a: Triple = (0.0, 0.0, 0.0)
@@ -43,6 +43,9 @@ class Medium(Described):
     sigma_s: Triple = (0.0, 0.0, 0.0)
     #: Mean cosine of the Henyey-Greenstein phase function, between -1 and 1.
     g: float = 0.0
+    #: Name of a .vol file, in the folder of the scene, with a grid of factors of both coefficients. A mesh has to be
+    #: around it. None: the medium is homogeneous.
+    density: str | None = None
 
 
 @dataclass(kw_only=True, eq=False)

@@ -1,6 +1,6 @@
 """Converts Mitsuba's scenes to glTF for caustique.
 
-`mitsuba_xml` reads the XML, and `xml_shapes`, `xml_materials`, `xml_colours` and `xml_lights` read its parts. Mitsuba
+`mitsuba_xml` reads the XML, and `xml_shapes`, `xml_materials`, `xml_colours`, `xml_grids` and `xml_lights` read its parts. Mitsuba
 itself reads meshes, images and spectra. The file lists all features that are left out or approximated, and caustique
 warns of them.
 """
@@ -9,6 +9,7 @@ import sys
 
 import mitsuba as mi
 import numpy as np
+import xml_grids
 import xml_lights
 import xml_materials
 from glb_package import glb, meshes
@@ -31,7 +32,8 @@ SHAPES = "obj, ply, serialized, cube, rectangle, sphere, disk, cylinder, shapegr
 
 
 def convert(path, output, parameters=None):
-    """Convert the XML at `path` to a .glb, with the environment's image beside it. `parameters` override `default`s."""
+    """Convert the XML at `path` to a .glb, with the environment's image and the grids of media beside it. `parameters`
+    override `default`s."""
     mi.set_log_level(mi.LogLevel.Error)
     reader = Reader(path, output, parameters or {})
     try:
@@ -42,6 +44,8 @@ def convert(path, output, parameters=None):
         raise Unsupported(f"the scene cannot be converted: {reason(error)}") from error
     if reader.sky is not None:
         mi.Bitmap(reader.sky).write(str(sky_file(output)))
+    for grid in filter(None, reader.grids.values()):
+        reader.grid_file(grid).write_bytes(grid.data)
     output.write_bytes(data)
     for loss in reader.losses:
         print(f"{path}: {loss}", file=sys.stderr)
@@ -60,6 +64,8 @@ class Reader:
         self.meshes, self.lights, self.cameras, self.losses = [], [], [], []
         # {shape: its mesh and material}, {BSDF: its surface}, {BSDF: its material}, {mesh: it is closed}
         self.built, self.surfaces, self.materials = {}, {}, {}
+        # {medium: its grid of densities, or None}
+        self.grids = {}
         self.one_sided, self.said, self.sky = 0, {}, None
         self.document = Document(path, parameters, self.lose)
 
@@ -215,7 +221,7 @@ class Reader:
                 self.materials[key] = self.material(bsdf, surface, node, mesh, matrix)
             material = self.materials[key]
         if interior is not None:
-            self.fill(node, material, interior)
+            mesh, matrix = self.fill(node, material, interior, (mesh, matrix))
         if emitter is not None:
             mesh = self.emit(emitter, node, mesh, material)
         self.count_one_sided(mesh, surface, material)
@@ -250,11 +256,17 @@ class Reader:
         name = bsdf.id if bsdf is not None and bsdf.id else f"{node.id or node.name or node.place} ({node.type})"
         return xml_materials.material(surface, name, mesh, matrix, self.lose)
 
-    def fill(self, node, material, interior):
-        """Put a medium inside a shape."""
-        medium = xml_lights.medium(interior) if interior.tag == "medium" else None
+    def fill(self, node, material, interior, placed):
+        """Put a medium inside a shape. Returns the placed mesh, (triangles, transform), in the space of the grid if there
+        is one."""
+        if interior.tag != "medium":
+            return placed
+        if interior not in self.grids:
+            self.grids[interior] = xml_grids.density(interior)
+        grid = self.grids[interior]
+        medium = xml_lights.medium(interior, grid and self.grid_file(grid).name)
         if medium is None:
-            return
+            return placed
         if material.null_bsdf:
             # A boundary that neither reflects nor refracts.
             material.null_bsdf, material.transmission, material.ior, material.roughness = False, 1.0, 1.0, 0.0
@@ -262,6 +274,11 @@ class Reader:
             material.medium = medium
         else:
             self.lose(f"{node.title}: the medium inside is left out, because its surface transmits no light")
+        return placed if grid is None else (xml_grids.in_space(*placed, grid.space), grid.space)
+
+    def grid_file(self, grid):
+        """Path of the file of a grid, beside the .glb."""
+        return self.output.with_suffix(f".{[*filter(None, self.grids.values())].index(grid)}.vol")
 
     def emit(self, emitter, node, mesh, material):
         """Make a shape emit. Returns the mesh without normals: facets emit from their geometric front."""
@@ -325,6 +342,9 @@ class Reader:
             if crop is not None:
                 self.said["crop"] = crop
             around = node.child("medium", tag="medium")
+            if around is not None and around.type == "heterogeneous":
+                self.lose(f"{node.title}: the medium around it is left out: a density that varies needs a mesh around it")
+                around = None
             medium = None if around is None else xml_lights.medium(around)
             if medium is not None:
                 self.said["medium"] = glb.coefficients(medium)

@@ -152,11 +152,12 @@ def sun(described, scale):
 # --- media ------------------------------------------------------------------------------------------------------------
 
 
-def medium(node):
-    """A homogeneous medium, or None with a warning."""
-    if node.type != "homogeneous":
-        density = " (extras.caustique.medium.density names a .vol file)" if node.type == "heterogeneous" else ""
-        node.drop(f"a medium whose density varies over space is not imported{density}")
+def medium(node, density=None):
+    """A medium, or None with a warning. `density`: name of the file of a grid that multiplies the coefficients."""
+    if node.dropped:
+        return None
+    if node.type not in ("homogeneous", "heterogeneous"):
+        node.drop("a medium of this type is left out; known are homogeneous and heterogeneous")
         return None
     scale = node.number("scale", 1.0)
     if node.child("material") is not None:
@@ -165,14 +166,16 @@ def medium(node):
     if node.child("sigma_s") is not None or node.child("sigma_a") is not None:
         scattering, absorption = coefficient(node, "sigma_s", 0.0), coefficient(node, "sigma_a", 0.0)
     else:
-        extinction, albedo = coefficient(node, "sigma_t", 1.0), coefficient(node, "albedo", 0.75)
+        extinction = np.ones(3) if density else coefficient(node, "sigma_t", 1.0)
+        albedo = coefficient(node, "albedo", 0.75)
         scattering, absorption = extinction * albedo, extinction * (1.0 - albedo)
     phase = node.child(tag="phase")
     if phase is not None and phase.type not in ("isotropic", "hg"):
         phase.drop("a phase function of this type is taken as isotropic")
     g = phase.number("g", 0.8) if phase is not None and phase.type == "hg" else 0.0
     limited = lambda values: tuple(float(x) for x in np.maximum(values * scale, 0.0))
-    return meshes.Medium(sigma_a=limited(absorption), sigma_s=limited(scattering), g=float(np.clip(g, -0.99, 0.99)))
+    g = float(np.clip(g, -0.99, 0.99))
+    return meshes.Medium(sigma_a=limited(absorption), sigma_s=limited(scattering), g=g, density=density)
 
 
 def coefficient(node, name, usual):

@@ -3,6 +3,7 @@ it."""
 
 import contextlib
 import io
+import struct
 import tempfile
 import unittest
 from pathlib import Path
@@ -12,6 +13,12 @@ from translation import ROOT, from_xml, gltf, to_xml
 CAMERA = '<sensor type="perspective"><float name="fov" value="45"/></sensor>'
 LIGHT = '<emitter type="point"><rgb name="intensity" value="1"/></emitter>'
 FLOOR = '<shape type="rectangle" id="floor"/>'
+
+
+def vol(values, box=(5, 5, 5, 7, 7, 7), channels=1):
+    """The bytes of a grid of cells along x, of Mitsuba's format."""
+    head = struct.pack("<3sB5i6f", b"VOL", 3, 1, len(values) // channels, 1, 1, channels, *box)
+    return head + struct.pack(f"<{len(values)}f", *values)
 
 
 class Reads(unittest.TestCase):
@@ -108,16 +115,32 @@ class Reads(unittest.TestCase):
                 self.assertEqual(len(losses), len(said), losses)
                 self.assertTrue(all(word in loss for word, loss in zip(said, losses)), losses)
 
-    def test_media_whose_density_varies_are_named(self):
-        grid = '<volume type="gridvolume" name="sigma_t"><string name="filename" value="smoke.vol"/></volume>'
+    def test_grids_of_density_that_are_not_carried_are_named(self):
+        volume = '<volume type="{}" name="sigma_t"><string name="filename" value="smoke.vol"/>{}</volume>'
+        grid, flat = volume.format("gridvolume", ""), '<transform name="to_world"><scale z="0"/></transform>'
         cube = '<shape type="cube"><bsdf type="null"/><medium type="{}" name="interior">{}</medium></shape>'
-        for kind, reason in (("heterogeneous", "density varies over space"), ("homogeneous", "varies over space")):
-            losses = self.losses(cube.format(kind, grid))
+        camera = '<sensor type="perspective"><medium type="heterogeneous">{}</medium></sensor>'
+        (self.folder / "smoke.vol").write_bytes(vol([1, 2, 3], channels=3))
+        for part, reason in [(cube.format("heterogeneous", grid), "its density has 3 channels"),
+                             (cube.format("homogeneous", grid), "varies over space"),
+                             (cube.format("heterogeneous", volume.format("sdf", "")), "a volume of type sdf"),
+                             (camera.format(grid), "needs a mesh around it")]:
+            losses = self.losses(part, "" if "sensor" in part else CAMERA)
             self.assertTrue(any(reason in loss for loss in losses), losses)
+        (self.folder / "smoke.vol").write_bytes(vol([1, 2, 3]))
+        losses = self.losses(cube.format("heterogeneous", volume.format("gridvolume", flat)))
+        self.assertTrue(any("is singular" in loss for loss in losses), losses)
+        self.output.unlink()
+        for data, reason in [(b"VOL\x04" + bytes(60), "no .vol file of version 3"), (vol([1, 2, 3])[:-1], "cut off"), (b"", "no .vol")]:
+            (self.folder / "smoke.vol").write_bytes(data)
+            scene = self.write(CAMERA + LIGHT + cube.format("heterogeneous", grid))
+            with self.assertRaisesRegex(gltf.Unsupported, reason), contextlib.redirect_stderr(io.StringIO()):
+                from_xml.convert(scene, self.output)
+            self.assertFalse(self.output.exists())
 
-    def losses(self, inside):
+    def losses(self, inside, camera=CAMERA):
         """The losses of a scene with a camera, a light and this."""
-        return self.document(self.write(CAMERA + LIGHT + inside))["scenes"][0]["extras"]["caustique"]["losses"]
+        return self.document(self.write(camera + LIGHT + inside))["scenes"][0]["extras"]["caustique"]["losses"]
 
     def test_the_documented_command_is_not_refused(self):
         text = (ROOT / "docs" / "researchers.md").read_text()

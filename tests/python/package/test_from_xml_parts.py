@@ -13,6 +13,7 @@ from pathlib import Path
 
 import mitsuba as mi
 import numpy as np
+from test_from_xml import vol
 from translation import from_xml, gltf
 
 import caustique as cq
@@ -176,6 +177,32 @@ class Parts(unittest.TestCase):
         self.assertAlmostEqual(low + (1 - low) * anisotropy["anisotropyStrength"] ** 2, 0.4)
         self.assertAlmostEqual(anisotropy["anisotropyRotation"], np.pi / 2)
 
+    def test_smoke_absorbs_as_its_grid_says(self):
+        """Four cells from the right to the left, 1 1 3 3, of an absorbing grid before a sky of 1. The box of the grid is the
+        unit cube, or that of the file, in a turned mesh that is larger. The transmittance is exp(-0.4 value 2) where the
+        cells at the ends are, and 1 where the box is not."""
+        turn = '<scale x="-1"/>'
+        for place, more, box in [('<scale value="2"/><translate x="-1" y="-1" z="-1"/>', "", (5, 5, 5, 7, 7, 7)),
+                                 ("", '<boolean name="use_grid_bbox" value="true"/>', (-1, -1, -1, 1, 1, 1))]:
+            (self.folder / "smoke.vol").write_bytes(vol([1, 1, 3, 3], box))
+            path = self.folder / "scene.xml"
+            path.write_text(
+                '<scene version="3.0.0"><sensor type="perspective"><transform name="to_world">'
+                '<lookat origin="0 0 100" target="0 0 0" up="0 1 0"/></transform>'
+                f'<float name="fov" value="{np.degrees(2 * np.arctan(1.5 / 100))}"/><film type="hdrfilm">'
+                '<integer name="width" value="6"/><integer name="height" value="4"/><rfilter type="box"/></film></sensor>'
+                '<emitter type="constant"><float name="radiance" value="1"/></emitter>'
+                '<shape type="cube"><transform name="to_world"><scale x="2" y="3" z="4"/><rotate y="1" angle="10"/></transform>'
+                '<bsdf type="null"/><medium type="heterogeneous" name="interior"><float name="scale" value="0.4"/>'
+                '<rgb name="albedo" value="0"/><volume type="gridvolume" name="sigma_t">'
+                f'<transform name="to_world">{place}{turn}</transform><string name="filename" value="smoke.vol"/>{more}'
+                "</volume></medium></shape></scene>")
+            self.assertEqual(self.convert(path), "")
+            scene = cq.Scene(self.folder / "scene.glb")
+            columns = scene.render(method="path", iterations=1024, seed=1, finish=False).picture.mean((0, 2))
+            # Columns are half a metre wide.
+            np.testing.assert_allclose(columns[[0, 1, 4, 5]], [1.0, np.exp(-2.4), np.exp(-0.8), 1.0], atol=TOLERANCE)
+
     def test_a_shapegroup_is_written_once(self):
         files(self.folder)
         group = PARTS["instance"].replace("{at}", "")
@@ -212,7 +239,7 @@ TAGS = {
     "sensor": "perspective thinlens orthographic fisheye".split(),
     "texture": "bitmap checkerboard mesh_attribute scale noise".split(),
     "medium": "homogeneous heterogeneous".split(),
-    "film": ["hdrfilm"], "phase": ["hg", "sggx"], "integrator": ["path"], "volume": ["constvolume"],
+    "film": ["hdrfilm"], "phase": ["hg", "sggx"], "integrator": ["path"], "volume": ["constvolume", "gridvolume"],
 }
 VALUES = "float integer boolean string rgb spectrum point vector blackbody srgb".split()
 NAMES = (
