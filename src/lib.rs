@@ -21,6 +21,9 @@ pub mod temporary;
 
 pub mod limits;
 
+#[cfg(feature = "cli")]
+pub mod argument;
+
 pub mod math;
 
 pub mod random;

@@ -55,7 +55,7 @@ pub struct MergeArgs {
     #[arg(long, help_heading = "Running")]
     reproducible: bool,
     /// Threads; 0 takes all cores
-    #[arg(long, value_name = "T", default_value_t = 0, value_parser = caustique::options::number::threads, help_heading = "Running")]
+    #[arg(long, value_name = "T", default_value_t = 0, value_parser = caustique::argument::threads, help_heading = "Running")]
     threads: usize,
 }
 

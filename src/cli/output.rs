@@ -1,12 +1,12 @@
 //! Options and checks that all commands with output files share.
 
+use caustique::argument::{Elsewhere, Ranged};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::{LayerSet, Naming};
 use caustique::image::exr::{self, ColourSpace, Compression};
 use caustique::image::tonemap::{Contrast, Look, ToneMap};
 use caustique::image::{atomic, png};
 use caustique::options::FinishOptions;
-use caustique::options::number::Ranged;
 use caustique::scene::description::PictureDefaults;
 use serde::Serialize;
 use std::io::IsTerminal;
@@ -21,41 +21,49 @@ pub struct PictureArgs {
     /// Also write a PNG to look at
     #[arg(long, value_name = "FILE.png")]
     #[serde(skip)]
+    #[arg(not_in_python = "an argument of Image.save")]
     pub png: Option<PathBuf>,
     /// Exposure of the PNG in stops [default: the scene's, else 0]
     #[arg(long, value_name = "EV", between = (Unbounded, Unbounded), allow_negative_numbers = true)]
     #[serde(skip)]
     #[arg(hide_short_help = true)]
+    #[arg(not_in_python = "an argument of Image.save")]
     pub exposure: Option<f64>,
     /// Tone curve of the PNG [default: the scene's, else agx]
     #[arg(long, value_enum)]
     #[serde(skip)]
     #[arg(hide_short_help = true)]
+    #[arg(not_in_python = "an argument of Image.save")]
     pub tonemap: Option<ToneMap>,
     /// Contrast of the tone curves agx and filmic, as Blender's looks [default: the scene's, else medium]
     #[arg(long, value_enum)]
     #[serde(skip)]
     #[arg(hide_short_help = true)]
+    #[arg(not_in_python = "an argument of Image.save")]
     pub contrast: Option<Contrast>,
     /// Compression of the EXR; all are lossless
     #[arg(long, value_enum, default_value_t)]
     #[arg(hide_short_help = true)]
+    #[arg(not_in_python = "an argument of Image.save", in_stages = true)]
     pub compression: Compression,
     /// Store layers for which half floats suffice as such, as --layers comp does: the picture, its finished parts, albedo
     /// and normals
     #[arg(long)]
     #[serde(skip)]
     #[arg(hide_short_help = true)]
+    #[arg(not_in_python = "an argument of Image.save", in_stages = true)]
     pub half: bool,
     /// Store each layer as a part of the EXR, for programs that unpack all channels of a part
     #[arg(long)]
     #[serde(skip)]
     #[arg(hide_short_help = true)]
+    #[arg(not_in_python = "an argument of Image.save", in_stages = true)]
     pub multi_part: bool,
     /// Linear colour space of the pictures in the EXR
     #[arg(long, value_enum, default_value_t)]
     #[serde(skip)]
     #[arg(hide_short_help = true)]
+    #[arg(not_in_python = "an argument of Image.save", in_stages = true)]
     pub colorspace: ColourSpace,
 }
 

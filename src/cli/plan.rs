@@ -3,11 +3,11 @@
 use super::progress::{Form, duration, percent};
 use super::warnings::lines;
 use super::{print, print_json, printable, scene};
+use caustique::argument::threads;
 use caustique::error::Result;
-use caustique::options::number::threads;
 use caustique::options::{RenderOptions, SceneOptions};
 use caustique::pipeline::plan::{PlannedPicture, plan_picture};
-use caustique::pipeline::{Forecast, Loaded, MethodRequest, forecast, with_light_paths};
+use caustique::pipeline::{Forecast, Loaded, forecast};
 use caustique::plan::{EffectPlan, Plan};
 use caustique::scene::View;
 use caustique::stop::Stop;
@@ -48,10 +48,11 @@ fn report(args: &PlanArgs) -> Result<()> {
     let (options, form) = (&args.options, Form::for_output(args.json));
     let request = options.picture_request()?;
     let loaded = scene::read(&options.scene, form, rayon::current_num_threads())?;
-    let auto = matches!(request.method, MethodRequest::Auto(_));
+    let auto = request.settings.method.0.is_none();
     let doing = if auto { "choosing a method" } else { "planning" };
-    let planned = form.during(doing, || plan_picture(request, &options.scene.path, &loaded, &Stop::default()))?;
-    let forecast = options.target_error.map(|target| Ok((target, forecast_error(args, &loaded, &planned, target)?)));
+    let planned = form.during(doing, || plan_picture(&request, &options.scene.path, &loaded, &Stop::default()))?;
+    let forecast =
+        options.settings.target_error.map(|target| Ok((target, forecast_error(args, &loaded, &planned, target)?)));
     let forecast = forecast.transpose()?;
     let plan = &planned.plan;
     if args.json {
@@ -80,7 +81,8 @@ fn report(args: &PlanArgs) -> Result<()> {
 /// Forecasts the cost of rendering to the relative error `target`; `None` if it cannot be known.
 fn forecast_error(args: &PlanArgs, loaded: &Loaded, planned: &PlannedPicture, target: f64) -> Result<Option<Forecast>> {
     let view = View::new(&loaded.scene, &planned.camera);
-    let settings = with_light_paths(planned.chosen.settings.clone(), args.options.photons, view.camera.whole()[0]);
+    let settings =
+        planned.chosen.settings.clone().with_light_paths(args.options.settings.photons, view.camera.whole()[0]);
     let mut finish = args.options.forecast_finish()?;
     let choice = planned.chosen.spent();
     let work = || forecast(view, &settings, &mut finish, target, choice);

@@ -1,10 +1,9 @@
 //! Descriptions of options for Python's arguments and stubs, the render settings of USD stages, the panel of Blender's
 //! add-on, and the tables in the documentation.
 
-use super::check::takes;
-use super::number::ValueRange;
 use super::parse::command;
-use crate::render::Method;
+use crate::argument::{InPython, InStages, NotInPython, OfScene, ValueRange};
+use crate::render::{Method, SettingsRequest};
 use clap::{Arg, Command, ValueEnum};
 use serde::Serialize;
 use std::any::TypeId;
@@ -65,61 +64,9 @@ pub enum ValueKind {
     Text,
 }
 
-/// Options that are not arguments in Python, and why.
-const NOT_IN_PYTHON: [(&str, &str); 19] = [
-    ("verbose", "Python's warnings are not grouped"),
-    ("output", "the picture is an Image: its method save writes it"),
-    ("png", "an argument of Image.save"),
-    ("exposure", "an argument of Image.save"),
-    ("tonemap", "an argument of Image.save"),
-    ("contrast", "an argument of Image.save"),
-    ("compression", "an argument of Image.save"),
-    ("half", "an argument of Image.save"),
-    ("multi_part", "an argument of Image.save"),
-    ("colorspace", "an argument of Image.save"),
-    ("exr_naming", "an argument of Image.save"),
-    ("usd_layer", "a file beside the EXR"),
-    ("preview", "the callback progress shows how a render goes"),
-    ("progress", "its progress is a callback"),
-    ("debug_techniques", "files beside the EXR"),
-    ("skip_existing", "a Scene is one frame"),
-    ("frame_seed", "a Scene is one frame"),
-    ("temporal", "a Scene is one frame"),
-    ("no_checkpoint", "nothing is saved unless checkpoint is given"),
-];
-
-/// Options that are arguments of Python's `Scene`, and their names there.
-const OF_SCENE: [(&str, &str); 17] = [
-    ("light_preset", "light_preset"),
-    ("background", "background"),
-    ("scene_name", "scene_name"),
-    ("animation", "animation"),
-    ("variant", "variant"),
-    ("pose", "pose"),
-    ("frames", "frame"),
-    ("frame_rate", "frame_rate"),
-    ("shutter", "shutter"),
-    ("env", "environment"),
-    ("env_rotation", "environment_rotation"),
-    ("env_strength", "environment_strength"),
-    ("light_units", "light_units"),
-    ("glass", "glass"),
-    ("effects", "effects"),
-    ("allow_outside", "allow_outside"),
-    ("strict", "strict"),
-];
-
 /// Headings of the options that a USD stage may set. Stages come from untrusted sources, so only the command line sets
 /// files and permissions.
 const STAGE_HEADINGS: [&str; 6] = ["Method", "When to stop", "Expert", "Light and glass", "Effects", "Finish"];
-/// Options under other headings that a stage may set.
-const ALSO_IN_STAGES: [&str; 8] =
-    ["filter", "layers", "exr_naming", "compression", "half", "multi_part", "colorspace", "reproducible"];
-/// Options under `STAGE_HEADINGS` that a stage may not set: files, permissions, memory, and options for which USD has
-/// other means.
-const NOT_IN_STAGES: [&str; 8] =
-    ["env", "light_preset", "model", "allow_outside", "strict", "photon_memory", "light_units", "temporal"];
-
 /// Describes the options of a command, in the order of its help.
 pub fn describe(command: &Command) -> Vec<OptionDescription> {
     command.get_arguments().filter(|arg| arg.get_long().is_some() && arg.get_id() != "help").map(entry).collect()
@@ -140,14 +87,12 @@ fn entry(arg: &Arg) -> OptionDescription {
     let choices = arg.get_possible_values();
     let help = |value: &clap::builder::PossibleValue| value.get_help().map(ToString::to_string).unwrap_or_default();
     let kind = kind(arg);
-    let not_in_python = NOT_IN_PYTHON.iter().find(|(option, _)| *option == name).map(|(_, why)| *why);
-    let of_scene = OF_SCENE.iter().find(|(option, _)| *option == name).map(|(_, name)| *name);
-    let python = not_in_python.is_none().then(|| match (of_scene, name.as_str()) {
-        (Some(argument), _) => argument.into(),
-        (None, "no_finish") => "finish".into(),
-        (None, name) => name.into(),
-    });
+    let not_in_python = arg.get().map(|NotInPython(reason)| *reason);
+    let of_scene = arg.get().map(|OfScene(name)| *name);
+    let renamed = of_scene.or(arg.get().map(|InPython(name)| *name));
+    let python = not_in_python.is_none().then(|| renamed.unwrap_or(&name).to_owned());
     let heading = arg.get_help_heading().unwrap_or_default();
+    let allowed = arg.get().map(|InStages(allowed)| *allowed);
     let defaults = arg.get_default_values().iter().filter(|_| arg.get_action().takes_values());
     OptionDescription {
         option: format!("--{}", arg.get_long().unwrap_or_default()),
@@ -160,7 +105,7 @@ fn entry(arg: &Arg) -> OptionDescription {
         heading: heading.into(),
         help: arg.get_long_help().or(arg.get_help()).map(ToString::to_string).unwrap_or_default(),
         methods: methods(&name),
-        stage: is_allowed_in_stages(&name, heading, kind),
+        stage: kind != ValueKind::Path && allowed.unwrap_or(STAGE_HEADINGS.contains(&heading)),
         python,
         of_scene: of_scene.is_some(),
         not_in_python,
@@ -191,48 +136,14 @@ fn kind(arg: &Arg) -> ValueKind {
 
 /// Names of the methods that take an option; empty if all do.
 fn methods(option: &str) -> Vec<&'static str> {
-    let taking = Method::value_variants().iter().filter(|method| takes(option, **method));
+    let taking = Method::value_variants().iter().filter(|method| SettingsRequest::takes(option, **method));
     let names: Vec<&str> = taking.map(|method| method.name()).collect();
     if names.len() == Method::value_variants().len() { Vec::new() } else { names }
-}
-
-/// Whether a USD stage may set an option.
-fn is_allowed_in_stages(name: &str, heading: &str, kind: ValueKind) -> bool {
-    let allowed = STAGE_HEADINGS.contains(&heading) && !NOT_IN_STAGES.contains(&name);
-    kind != ValueKind::Path && (allowed || ALSO_IN_STAGES.contains(&name))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn lists_of_exceptions_name_existing_options() {
-        let known: Vec<String> = describe(&command()).into_iter().map(|entry| entry.name).collect();
-        // Options that only the program defines.
-        let of_program = [
-            "output",
-            "png",
-            "exposure",
-            "tonemap",
-            "contrast",
-            "compression",
-            "half",
-            "multi_part",
-            "colorspace",
-            "usd_layer",
-            "preview",
-            "debug_techniques",
-            "skip_existing",
-            "temporal",
-            "progress",
-        ];
-        let listed =
-            NOT_IN_PYTHON.iter().chain(&OF_SCENE).map(|(name, _)| *name).chain(NOT_IN_STAGES).chain(ALSO_IN_STAGES);
-        for name in listed {
-            assert!(known.iter().any(|option| option == name) || of_program.contains(&name), "{name}");
-        }
-    }
 
     #[test]
     fn an_option_is_described_by_its_definition() {

@@ -1,5 +1,6 @@
 //! Options of the finish, which `render`, `finish`, `merge` and `converge` have in common.
 
+use crate::argument::Elsewhere;
 use crate::finish::DenoiserChoice;
 use crate::pipeline::FinishRequest;
 use serde::Serialize;
@@ -17,6 +18,7 @@ pub struct FinishOptions {
     /// Combine five bandwidth levels before denoising, by equation (6) of the 2021 paper with a network: 'compact'
     /// comes with the program; or an ONNX file
     #[arg(long, value_name = "compact|FILE.onnx", help_heading = "Expert")]
+    #[arg(in_stages = false)]
     pub model: Option<String>,
 }
 

@@ -1,6 +1,6 @@
 //! Frames of an animation, and frame numbers in file names.
 
-use super::number::whole;
+use crate::argument::whole;
 use crate::error::{Error, ErrorKind};
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;

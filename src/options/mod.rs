@@ -1,22 +1,19 @@
-//! The options of a render. Each is defined once, with its name, default, unit, range and help; `check` says which methods
-//! take it.
+//! The options of a render. Each is defined once, with its name, default, unit, range and help, and with what Python and
+//! USD make of it. Those of the method are [`SettingsRequest`](crate::render::SettingsRequest).
 //!
 //! The command line parses these types. Python's keyword arguments are turned into command-line arguments and parsed by
 //! [`parse`]. [`catalogue`] describes the options for generated files: the add-on's panel, the options in a USD stage,
 //! stubs and tables.
 
 pub mod catalogue;
-mod check;
 mod finish;
 mod frames;
-pub mod number;
 mod parse;
 mod render;
 mod run;
 mod scene;
 mod values;
 
-pub use check::takes;
 pub use clap::ValueEnum;
 pub use finish::FinishOptions;
 pub use frames::{Frames, files_of_frames, is_pattern, no_frames, path_of_frame};
@@ -24,4 +21,4 @@ pub use parse::{InvalidOption, one_of, parse};
 pub use render::{RenderOptions, SizeOptions};
 pub use run::RunOptions;
 pub use scene::{Background, EnvironmentChoice, SceneOptions};
-pub use values::{BandwidthChoice, CropChoice, FrameSeed, GridChoice, MethodChoice, OnOff};
+pub use values::{CropChoice, FrameSeed};

@@ -77,7 +77,10 @@ mod tests {
     fn arguments_are_parsed_or_rejected_with_a_reason() {
         let parse = |text: &str| parse(text.split(' ').map(OsString::from));
         let (render, run) = parse("--photons=1000 --filter gaussian 2.5 --memory=64 -- scene.glb").unwrap();
-        assert_eq!((render.photons, run.memory, render.scene.path.to_str()), (Some(1000), Some(64), Some("scene.glb")));
+        assert_eq!(
+            (render.settings.photons, run.memory, render.scene.path.to_str()),
+            (Some(1000), Some(64), Some("scene.glb"))
+        );
         for (text, option, reason) in [
             ("--photons=0 a.glb", "photons", "it must be a whole number from 1 to 50000000"),
             ("--max-depth=0 a.glb", "max_depth", "it must be a whole number from 1 to 1000000"),

@@ -1,7 +1,7 @@
 //! Options about the run of a render: what is saved, how much memory and how many threads it takes, which layers it
 //! writes.
 
-use super::number::{Ranged, threads};
+use crate::argument::{Elsewhere, Ranged, threads};
 use crate::error::Result;
 use crate::film::{Naming, Selection};
 use crate::pipeline::Saving;
@@ -18,10 +18,12 @@ pub struct RunOptions {
     /// 'comp' has the picture, its parts, albedo, normal, depth and cryptomattes, in half floats if these suffice. 'lobes'
     /// in a list stands for diffuse, glossy and transmitted light, direct and indirect, and their colours
     #[arg(long, value_name = "all|comp|beauty|LIST", default_value = "all", help_heading = "Output")]
+    #[arg(in_stages = true)]
     pub layers: String,
     /// Names of the EXR's channels: 'blender' writes the names of Blender's own renders
     #[arg(long, value_enum, default_value_t, help_heading = "Output")]
     #[arg(hide_short_help = true)]
+    #[arg(not_in_python = "an argument of Image.save", in_stages = true)]
     pub exr_naming: Naming,
     /// Save the state of the render to this file every few minutes, and keep it at the end, so that --resume can
     /// continue or extend the render [default: beside the output, and removed at the end]
@@ -39,6 +41,7 @@ pub struct RunOptions {
     #[arg(long, help_heading = "Running")]
     #[serde(skip)]
     #[arg(hide_short_help = true)]
+    #[arg(not_in_python = "nothing is saved unless checkpoint is given")]
     pub no_checkpoint: bool,
     /// Start anew although there is the checkpoint of a render that was stopped, and replace it
     #[arg(long, help_heading = "Running")]
@@ -65,6 +68,7 @@ pub struct RunOptions {
     #[arg(long, help_heading = "Running")]
     #[serde(skip)]
     #[arg(hide_short_help = true)]
+    #[arg(in_stages = true)]
     pub reproducible: bool,
 }
 

@@ -1,7 +1,7 @@
 //! Options about a scene: where it is, how it is read, and which of its effects are simulated.
 
 use super::frames::{Frames, path_of_frame};
-use super::number::{Ranged, rgb, strength};
+use crate::argument::{Elsewhere, Ranged, rgb, strength};
 use crate::path_class::Switches;
 use crate::pipeline::load::{Environment, SceneRequest};
 use crate::scene::LightPreset;
@@ -24,30 +24,37 @@ pub struct SceneOptions {
     ///
     /// '####' in the names of files, also of the scene, stands for the number of the frame
     #[arg(long, value_name = "A-B[,STEP]", help_heading = "Picture")]
+    #[arg(of_scene = "frame")]
     pub frames: Option<Frames>,
     /// Frames per second, if the scene does not say: frame N is at N / FPS seconds [default: 24]
     #[arg(long, value_name = "FPS", between = (Excluded(0.0), Unbounded), requires = "frames", help_heading = "Picture")]
     #[arg(hide_short_help = true)]
+    #[arg(of_scene = "frame_rate")]
     pub frame_rate: Option<f64>,
     /// Name of the scene to render, in a file with several [default: the file's default scene]
     #[arg(long = "scene", value_name = "NAME", help_heading = "Picture")]
     #[arg(hide_short_help = true)]
+    #[arg(of_scene = "scene_name")]
     pub scene_name: Option<String>,
     /// Name of the only animation that moves the scene [default: all do]
     #[arg(long, value_name = "NAME", help_heading = "Picture")]
     #[arg(hide_short_help = true)]
+    #[arg(of_scene = "animation")]
     pub animation: Option<String>,
     /// Name of the material variant to render (KHR_materials_variants) [default: the materials without a variant]
     #[arg(long, value_name = "NAME", help_heading = "Picture")]
     #[arg(hide_short_help = true)]
+    #[arg(of_scene = "variant")]
     pub variant: Option<String>,
     /// Pose of what the file animates: 'rest' is the file without its animations
     #[arg(long, value_enum, default_value_t, help_heading = "Picture")]
     #[arg(hide_short_help = true)]
+    #[arg(of_scene = "pose")]
     pub pose: Pose,
     /// Motion blur: when the shutter opens and closes, in frames relative to the frame, such as -0.25,0.25; 0 is none
     /// [default: what the scene says]
     #[arg(long, value_name = "OPEN,CLOSE", allow_hyphen_values = true, help_heading = "Picture")]
+    #[arg(of_scene = "shutter")]
     pub shutter: Option<Shutter>,
     /// The file is one of a sequence, of which each has a frame to itself
     #[arg(skip)]
@@ -55,52 +62,63 @@ pub struct SceneOptions {
     of_sequence: bool,
     /// Environment light: a latitude-longitude image (.exr or .hdr), or one radiance R,G,B
     #[arg(long, value_name = "FILE|R,G,B")]
+    #[arg(of_scene = "environment", in_stages = false)]
     pub env: Option<EnvironmentChoice>,
     /// Rotation of the environment about the vertical, counter-clockwise seen from above (degrees)
     #[arg(long, value_name = "DEG", between = (Unbounded, Unbounded), allow_negative_numbers = true)]
     #[arg(hide_short_help = true)]
+    #[arg(of_scene = "environment_rotation")]
     pub env_rotation: Option<f64>,
     /// Factor on the radiance of the environment
     #[arg(long, value_name = "S", value_parser = strength)]
     #[arg(hide_short_help = true)]
+    #[arg(of_scene = "environment_strength")]
     pub env_strength: Option<f64>,
     /// Procedural environment in place of the scene's own [default: 'studio' if the scene has no light at all]
     #[arg(long, value_enum, conflicts_with = "env")]
     #[arg(hide_short_help = true)]
+    #[arg(of_scene = "light_preset", in_stages = false)]
     pub light_preset: Option<LightPreset>,
     /// Environment behind the scene: 'hide' makes the background transparent, in the EXR and the PNG [default: as the
     /// scene says, else 'show']
     #[arg(long, value_enum, help_heading = "Picture")]
     #[arg(hide_short_help = true)]
+    #[arg(of_scene = "background")]
     pub background: Option<Background>,
     /// Units of lamps: 'auto' decides by the program that wrote the file; 'photometric' is the default of Blender's
     /// exporter, 683 lumen per watt
     #[arg(long, value_enum, default_value_t)]
     #[arg(hide_short_help = true)]
+    #[arg(of_scene = "light_units", in_stages = false)]
     pub light_units: LightUnits,
     /// Glass if the file does not say whether it is solid: 'auto' makes closed meshes solid, so that they refract
     /// light, and says so
     #[arg(long, value_enum, default_value_t)]
     #[arg(hide_short_help = true)]
+    #[arg(of_scene = "glass")]
     pub glass: Glass,
     /// Switch effects off (-) or on (+) by name, such as -dispersion,+volume [default: all that the scene calls for]
     ///
     /// Classes of light paths: emission, direct, indirect, glossy, caustic, sds. Others: dispersion, volume (or
     /// medium), depth_of_field, environment, alpha (cut-outs), textures. 'caustique plan' lists the effects of a scene
     #[arg(long, value_name = "LIST", allow_hyphen_values = true, help_heading = "Effects")]
+    #[arg(of_scene = "effects")]
     pub effects: Option<Switches>,
     /// Allow the scene to name files (buffers, textures, its environment) outside its own folder
     #[arg(long)]
     #[arg(hide_short_help = true)]
+    #[arg(of_scene = "allow_outside", in_stages = false)]
     pub allow_outside: bool,
     /// Make an error of anything in the scene that is ignored or approximated
     #[arg(long)]
     #[arg(hide_short_help = true)]
+    #[arg(of_scene = "strict", in_stages = false)]
     pub strict: bool,
     /// Print each warning; without it, the warnings of one kind are one line
     #[arg(long, help_heading = "Running")]
     #[serde(skip)]
     #[arg(hide_short_help = true)]
+    #[arg(not_in_python = "Python's warnings are not grouped")]
     pub verbose: bool,
 }
 

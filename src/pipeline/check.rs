@@ -1,7 +1,7 @@
 //! The second step: whether a request fits its scene and the memory, found before anything is rendered.
 
 use super::memory::MemoryCheck;
-use super::request::{MethodRequest, PictureRequest, Request};
+use super::request::{PictureRequest, Request};
 use super::{finish, layers};
 use crate::camera::Camera;
 use crate::error::{Error, ErrorKind, Result};
@@ -24,40 +24,32 @@ pub struct Checked {
 ///
 /// # Errors
 /// The scene has no such camera, or the method cannot render the scene.
-pub fn check_picture(picture: &PictureRequest<'_>, path: &Path, scene: &Scene) -> Result<Checked> {
+pub fn check_picture(picture: &PictureRequest, path: &Path, scene: &Scene) -> Result<Checked> {
     let camera = scene.camera(&picture.camera)?;
-    let settings = match &picture.method {
-        MethodRequest::Auto(auto) if scene.survey.catchers => {
-            (auto.settings_of)(Candidate::CAMERA_PATHS, camera.whole()[0])
-        }
+    let (request, size) = (&picture.settings, camera.whole()[0]);
+    let settings = match request.method.0 {
+        None if scene.survey.catchers => request.for_candidate(Candidate::CAMERA_PATHS, size),
         _ => None,
     };
-    let settings = settings.as_ref().unwrap_or(picture.method.settings());
-    check_settings(settings, path, scene)?;
-    let settings = with_light_paths(settings.clone(), picture.photons, camera.whole()[0]);
-    Ok(Checked { camera, settings })
+    let settings = settings.map_or_else(|| request.resolve(), Ok)?;
+    check_settings(&settings, path, scene)?;
+    Ok(Checked { camera, settings: settings.with_light_paths(request.photons, size) })
 }
 
 /// Checks a render before it starts: its picture, its network, its layers and its memory.
 ///
 /// # Errors
 /// Errors of [`check_picture`]; there is no such network; the scene has no such layer; the render does not fit into memory.
-pub(super) fn check(request: &Request<'_>, scene: &Scene) -> Result<Checked> {
+pub(super) fn check(request: &Request, scene: &Scene) -> Result<Checked> {
     let checked = check_picture(&request.picture, &request.scene.path, scene)?;
     request.finish_of(&checked.settings).map_or(Ok(()), finish::check)?;
     let (shape, finishes) = (layer_shape(&checked.settings, scene), request.finish.is_some());
     layers::check(&request.layers, &shape, finishes, true)?;
     layers::check_names(&request.layers, &shape, finishes, request.naming)?;
     let view = View::new(scene, &checked.camera);
-    let memory = MemoryCheck { view, method: request.picture.method.name(), finishes, limit: request.memory };
+    let memory = MemoryCheck { view, method: request.picture.settings.method.name(), finishes, limit: request.memory };
     memory.fit(checked.settings.clone())?;
     Ok(checked)
-}
-
-/// Sets the number of light paths per iteration: `photons`, or if it is `None` the default for a whole picture of this
-/// width and height.
-pub fn with_light_paths(settings: Settings, photons: Option<u32>, size: (u32, u32)) -> Settings {
-    Settings { photons: photons.unwrap_or(settings.default_photons(size)), ..settings }
 }
 
 /// Checks that a method can render the scene that was read from `path`.

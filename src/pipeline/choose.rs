@@ -4,11 +4,11 @@ use super::check::renders_catchers;
 use super::layers;
 use super::memory::MemoryCheck;
 use super::observer::{Event, Observer, Phase, during};
-use super::request::{MethodRequest, Request};
+use super::request::Request;
 use crate::choose::{self, Choice};
 use crate::error::{Error, ErrorKind, Result};
 use crate::render::output::layer_shape;
-use crate::render::{Candidate, Settings, TimeSpent};
+use crate::render::{Candidate, Settings, SettingsRequest, TimeSpent};
 use crate::scene::View;
 use crate::stop::Stop;
 
@@ -40,16 +40,18 @@ impl Chosen {
 /// `checked`: the settings if nothing is compared. `accepts` rejects candidates by their settings. If `stop` is requested,
 /// the comparison ends as soon as it can, and its result is not to be used.
 pub fn choose(
-    method: &mut MethodRequest<'_>,
+    request: &SettingsRequest,
     checked: Settings,
     view: View<'_>,
     accepts: impl Fn(&Settings) -> bool,
     stop: &Stop,
 ) -> Chosen {
-    let MethodRequest::Auto(auto) = method else { return Chosen::named(checked) };
+    if request.method.0.is_some() {
+        return Chosen::named(checked);
+    }
     let settings_of = |candidate| {
-        (auto.settings_of)(candidate, view.camera.whole()[0])
-            .filter(|settings| accepts(settings) && renders_catchers(settings, view.scene))
+        let settings = request.for_candidate(candidate, view.camera.whole()[0]);
+        settings.filter(|settings| accepts(settings) && renders_catchers(settings, view.scene))
     };
     match choose::choose(view, settings_of, stop) {
         Some(choice) => {
@@ -64,7 +66,7 @@ pub fn choose(
 /// # Errors
 /// The user has stopped the render.
 pub(super) fn choose_for_render(
-    request: &mut Request<'_>,
+    request: &Request,
     checked: Settings,
     view: View<'_>,
     observer: &mut dyn Observer,
@@ -74,12 +76,12 @@ pub(super) fn choose_for_render(
     let fits = memory.admits();
     let accepts =
         |of: &Settings| fits(of) && layers::check(layers, &layer_shape(of, view.scene), finishes, true).is_ok();
-    let method = &mut request.picture.method;
-    let chosen = if let MethodRequest::Auto(_) = method {
+    let settings = &request.picture.settings;
+    let chosen = if settings.method.0.is_none() {
         let stop = observer.stop();
-        during(Phase::Choosing, observer, |_| choose(method, checked, view, accepts, &stop))
+        during(Phase::Choosing, observer, |_| choose(settings, checked, view, accepts, &stop))
     } else {
-        choose(method, checked, view, accepts, &Stop::default())
+        Chosen::named(checked)
     };
     observer.event(Event::Chosen(chosen.choice.as_ref()));
     refuse_stop(observer)?;
@@ -88,15 +90,13 @@ pub(super) fn choose_for_render(
 
 /// The settings of a render that continues from a checkpoint, whose candidate `auto` has chosen before.
 pub(super) fn chosen_before(
-    method: &MethodRequest<'_>,
+    request: &SettingsRequest,
     candidate: Option<Candidate>,
     checked: Settings,
     view: View<'_>,
 ) -> Chosen {
-    let settings = match (method, candidate) {
-        (MethodRequest::Auto(auto), Some(candidate)) => (auto.settings_of)(candidate, view.camera.whole()[0]),
-        _ => None,
-    };
+    let candidate_of_auto = candidate.filter(|_| request.method.0.is_none());
+    let settings = candidate_of_auto.and_then(|of| request.for_candidate(of, view.camera.whole()[0]));
     Chosen { settings: settings.unwrap_or(checked), candidate, choice: None }
 }
 

@@ -69,7 +69,7 @@ pub(super) struct Contents<'a> {
 /// # Errors
 /// The layers cannot be made. A finish that fails is no error: [`Delivery::finish_error`].
 pub(super) fn deliver_render(
-    request: &Request<'_>,
+    request: &Request,
     Iterated { rendered, head, mut finish, obsolete_checkpoint }: Iterated,
     facts: SceneFacts,
     observer: &mut dyn Observer,

@@ -14,7 +14,9 @@ use super::request::PictureRequest;
 use crate::error::{Error, ErrorKind, Result};
 use crate::film::LayerSet;
 use crate::finish::reads_for_picture;
-use crate::render::{Candidate, Control, Progress, RenderInput, Session, Settings, StopReason, run_session};
+use crate::render::{
+    Candidate, Control, Progress, RenderInput, Session, Settings, SettingsRequest, StopReason, run_session,
+};
 use crate::scene::View;
 use crate::stop::Stop;
 use std::path::Path;
@@ -30,7 +32,7 @@ const MIN_COARSE_PHOTONS: u32 = 1000;
 /// A picture to show while it renders.
 pub struct LiveRequest<'a> {
     /// The picture: camera, size and method.
-    pub picture: PictureRequest<'a>,
+    pub picture: PictureRequest,
     /// Path of the scene file, for messages.
     pub path: &'a Path,
     /// Limit on the memory of photons, pixels and layers; `None`: the memory of the machine alone.
@@ -84,7 +86,7 @@ pub fn render_live(
     }
     let checked = check_picture(&request.picture, request.path, scene)?;
     let view = View::new(scene, &checked.camera);
-    let (name, finishes) = (request.picture.method.name(), finish.is_some());
+    let (name, finishes) = (request.picture.settings.method.name(), finish.is_some());
     let memory = MemoryCheck { view, method: name, finishes, limit: request.memory };
     let fit = |settings: Settings| {
         let (settings, _) = memory.fit(settings)?;
@@ -92,7 +94,7 @@ pub fn render_live(
     };
     let known = request
         .candidate
-        .map(|candidate| chosen_before(&request.picture.method, Some(candidate), checked.settings.clone(), view));
+        .map(|candidate| chosen_before(&request.picture.settings, Some(candidate), checked.settings.clone(), view));
     if request.coarse > 1 {
         // The choice of a method takes longer than the coarse picture, so it comes later.
         let settings = known.as_ref().map_or(&checked.settings, |chosen| &chosen.settings);
@@ -114,9 +116,8 @@ pub fn render_live(
     let iterations = checked.settings.iterations;
     let chosen = known.unwrap_or_else(|| {
         let most = iterations.map_or(MAX_CHOICE_ITERATIONS, |iterations| iterations.min(MAX_CHOICE_ITERATIONS));
-        let mut method =
-            request.picture.method.map_candidates(|settings| Settings { iterations: Some(most), ..settings });
-        choose(&mut method, checked.settings, view, memory.admits(), &request.stop)
+        let shorter = SettingsRequest { iterations: Some(most), ..request.picture.settings };
+        choose(&shorter, checked.settings, view, memory.admits(), &request.stop)
     });
     if request.stop.requested() {
         // A choice that was interrupted is not used again.

@@ -40,7 +40,6 @@ mod slow_iteration;
 pub mod temporal;
 mod worst;
 
-pub use check::with_light_paths;
 pub use deliver::{Delivery, FINISHED_PICTURE, Reached, write_finish};
 pub use facts::SceneFacts;
 pub use finish::{FinishRequest, OpenFinish};
@@ -48,13 +47,13 @@ pub use forecast::{Forecast, forecast};
 pub use load::{Loaded, SceneRequest};
 pub use observer::{Event, Observer, Phase};
 pub use rendered_file::RenderedFile;
-pub use request::{AutoRequest, MethodRequest, PictureRequest, Request, Saving};
+pub use request::{PictureRequest, Request, Saving};
 pub use scene_info::scene_info;
 pub use worst::{Place, Tile, Worst};
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::film::MOTION;
-use crate::render::{Motion, RenderInput, Rendered, Settings};
+use crate::render::{Motion, RenderInput, Rendered};
 use crate::scene::View;
 use check::Checked;
 use motion::{MovingScene, few_moments};
@@ -68,7 +67,7 @@ use run::Running;
 ///
 /// # Errors
 /// The scene; options that contradict it; memory; a stop before the first iteration; a scene that the observer rejects.
-pub fn render(mut request: Request<'_>, observer: &mut dyn Observer) -> Result<Delivery> {
+pub fn render(mut request: Request, observer: &mut dyn Observer) -> Result<Delivery> {
     let stop = observer.stop();
     request.scene.options.motion_vectors = request.layers.wants(MOTION);
     let loaded = during(Phase::Reading, observer, |_| load::load(&request.scene, rayon::current_num_threads(), &stop))?;
@@ -79,17 +78,15 @@ pub fn render(mut request: Request<'_>, observer: &mut dyn Observer) -> Result<D
 ///
 /// # Errors
 /// Errors of [`render`].
-pub fn render_loaded(request: Request<'_>, loaded: &Loaded, observer: &mut dyn Observer) -> Result<Delivery> {
-    let lobes = request.layers.wants_lobes();
-    let method = request.picture.method.map_settings(move |settings| Settings { lobes, ..settings });
-    let mut request = Request { picture: PictureRequest { method, ..request.picture }, ..request };
+pub fn render_loaded(mut request: Request, loaded: &Loaded, observer: &mut dyn Observer) -> Result<Delivery> {
+    request.picture.settings.lobes = request.layers.wants_lobes();
     observer.accept(&loaded.scene)?;
     let Checked { camera, settings } = check::check(&request, &loaded.scene)?;
     let view = View::new(&loaded.scene, &camera);
     let resumption = Resumption::read(&request, view.scene, &settings)?;
     let chosen = match &resumption.saved {
-        Some((head, _)) => choose::chosen_before(&request.picture.method, head.candidate, settings, view),
-        None => choose::choose_for_render(&mut request, settings, view, observer)?,
+        Some((head, _)) => choose::chosen_before(&request.picture.settings, head.candidate, settings, view),
+        None => choose::choose_for_render(&request, settings, view, observer)?,
     };
     let planned = plan::plan_render(&request, &chosen, view, &loaded.removed)?;
     let prepared = prepare::prepare(&request, planned, view, observer)?;

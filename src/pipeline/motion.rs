@@ -46,7 +46,7 @@ impl<'a> MovingScene<'a> {
     /// # Errors
     /// The scene is invalid when the shutter opens or closes, or has other objects then.
     pub fn new(
-        request: &'a Request<'_>,
+        request: &'a Request,
         view: View<'a>,
         file: Option<&'a MovingFile>,
         stop: Stop,

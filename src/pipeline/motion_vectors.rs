@@ -20,7 +20,7 @@ use rayon::prelude::*;
 /// # Errors
 /// The scene is invalid one frame earlier or later.
 pub(super) fn motion_vectors(
-    request: &Request<'_>,
+    request: &Request,
     View { scene, camera }: View<'_>,
     file: Option<&MovingFile>,
     stop: &Stop,
@@ -52,7 +52,7 @@ pub(super) fn motion_vectors(
 }
 
 /// The poses of a scene in the previous frame, in its frame and in the next one; `None` if nothing is animated.
-fn poses(request: &Request<'_>, scene: &Scene, file: Option<&MovingFile>, stop: &Stop) -> Result<Option<[Pose; 3]>> {
+fn poses(request: &Request, scene: &Scene, file: Option<&MovingFile>, stop: &Stop) -> Result<Option<[Pose; 3]>> {
     let (path, options) = (&request.scene.path, &request.scene.options);
     let moments = file.map(MovingFile::moments).transpose()?;
     let pose = |after_frame: f64| {

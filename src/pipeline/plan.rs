@@ -13,8 +13,8 @@ use crate::error::Result;
 use crate::path_class::Switches;
 use crate::plan::switch::Removed;
 use crate::plan::{self, Plan};
-use crate::render::Settings;
 use crate::render::output::layer_shape;
+use crate::render::{Settings, SettingsRequest};
 use crate::scene::{Scene, View};
 use crate::stop::Stop;
 use std::path::Path;
@@ -66,18 +66,13 @@ pub struct PlannedPicture {
 ///
 /// # Errors
 /// Errors of [`check_picture`].
-pub fn plan_picture(
-    mut picture: PictureRequest<'_>,
-    path: &Path,
-    loaded: &Loaded,
-    stop: &Stop,
-) -> Result<PlannedPicture> {
+pub fn plan_picture(picture: &PictureRequest, path: &Path, loaded: &Loaded, stop: &Stop) -> Result<PlannedPicture> {
     let Loaded { scene, removed, .. } = loaded;
-    let checked = check_picture(&picture, path, scene)?;
+    let checked = check_picture(picture, path, scene)?;
     let view = View::new(scene, &checked.camera);
     let memory = MemoryCheck { view, method: "auto", finishes: true, limit: None };
-    let chosen = choose(&mut picture.method, checked.settings, view, memory.admits(), stop);
-    let PictureRequest { max_depth, switches, .. } = picture;
+    let chosen = choose(&picture.settings, checked.settings, view, memory.admits(), stop);
+    let SettingsRequest { max_depth, switches, .. } = picture.settings;
     let mut plan = plan(PlanInput { chosen: &chosen, max_depth, switches }, view, removed);
     plan.warnings.splice(0..0, scene.warnings.iter().cloned());
     Ok(PlannedPicture { camera: checked.camera, chosen, plan })
@@ -95,16 +90,11 @@ pub(super) struct Planned {
 ///
 /// # Errors
 /// The render does not fit.
-pub(super) fn plan_render(
-    request: &Request<'_>,
-    chosen: &Chosen,
-    view: View<'_>,
-    removed: &Removed,
-) -> Result<Planned> {
+pub(super) fn plan_render(request: &Request, chosen: &Chosen, view: View<'_>, removed: &Removed) -> Result<Planned> {
     let (method, finishes) = (chosen.settings.method.name(), request.finish.is_some());
     let memory = MemoryCheck { view, method, finishes, limit: request.memory };
     let (settings, less_memory) = memory.fit(chosen.settings.clone())?;
-    let PictureRequest { max_depth, switches, .. } = request.picture;
+    let SettingsRequest { max_depth, switches, .. } = request.picture.settings;
     let mut plan = plan(PlanInput { chosen, max_depth, switches }, view, removed);
     let shape = layer_shape(&settings, view.scene);
     let black = layers::black(&request.layers, &shape, finishes);

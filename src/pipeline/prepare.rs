@@ -32,7 +32,7 @@ pub(super) struct Prepared {
 /// # Errors
 /// The denoiser or the network cannot be opened.
 pub(super) fn prepare(
-    request: &Request<'_>,
+    request: &Request,
     Planned { settings, mut plan }: Planned,
     view: View<'_>,
     observer: &mut dyn Observer,
@@ -52,7 +52,7 @@ pub(super) fn prepare(
 /// Opens the finish, if there is to be one. Returns it with settings whose time limit leaves out the time that it
 /// takes.
 fn open_finish(
-    request: &Request<'_>,
+    request: &Request,
     View { scene, camera }: View<'_>,
     settings: Settings,
     observer: &mut dyn Observer,

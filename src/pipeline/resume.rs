@@ -21,7 +21,7 @@ impl Resumption {
     ///
     /// # Errors
     /// The checkpoint cannot be read, or belongs to another render.
-    pub fn read(request: &Request<'_>, scene: &Scene, settings: &Settings) -> Result<Resumption> {
+    pub fn read(request: &Request, scene: &Scene, settings: &Settings) -> Result<Resumption> {
         let Some(path) = &request.resume else {
             let is_stored = request.saving.is_some() || settings.is_shard();
             let scene = if is_stored { hash(request, scene)? } else { None };
@@ -35,7 +35,7 @@ impl Resumption {
 }
 
 /// A hash of the files that the scene is read from; `None` if it came through a pipe and cannot be read again.
-fn hash(request: &Request<'_>, scene: &Scene) -> Result<Option<String>> {
+fn hash(request: &Request, scene: &Scene) -> Result<Option<String>> {
     let environment = match &request.scene.environment {
         Some(Environment::File(path)) => Some(path.as_path()),
         _ => None,

@@ -43,7 +43,7 @@ impl<'a> Running<'a> {
     /// # Errors
     /// The checkpoint is of a picture of another size or method.
     pub fn start(
-        request: &'a Request<'_>,
+        request: &'a Request,
         stage: &'a RenderInput<'a>,
         chosen: &Chosen,
         Prepared { finish, target, plan, .. }: Prepared,
@@ -102,7 +102,7 @@ impl<'a> Running<'a> {
 
 /// Continues the iterations of a checkpoint.
 fn resume<'a>(
-    request: &Request<'_>,
+    request: &Request,
     stage: &'a RenderInput<'a>,
     state: State,
     observer: &mut dyn Observer,

@@ -23,7 +23,7 @@ pub use pass::{
 };
 pub use session::{Control, ExpectedError, MIN_ITERATIONS_FOR_ERROR, Progress, Session, State, render, run_session};
 pub use settings::{
-    BandwidthRule, Candidate, Counts, DEFAULT_ITERATIONS, DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY,
-    DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS, LIGHT_PATH_STEPS, Levels, MAX_CONNECTIONS, MAX_LIGHT_PATHS_PER_PIXEL,
-    MAX_SHARDS, Method, RadiusRule, Settings, Shard,
+    BandwidthChoice, BandwidthRule, Candidate, Counts, DEFAULT_ITERATIONS, DEFAULT_KNN, DEFAULT_MAP_KNN,
+    DEFAULT_MAP_MEMORY, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS, GridChoice, LIGHT_PATH_STEPS, Levels, MAX_CONNECTIONS,
+    MAX_LIGHT_PATHS_PER_PIXEL, MAX_SHARDS, Method, MethodChoice, OnOff, RadiusRule, Settings, SettingsRequest, Shard,
 };

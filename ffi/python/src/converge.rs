@@ -10,14 +10,14 @@ use caustique::camera::Camera;
 use caustique::error::Result;
 use caustique::finish::Finish;
 use caustique::image::tonemap::Look;
-use caustique::options::{MethodChoice, RenderOptions, SceneOptions};
+use caustique::options::{RenderOptions, SceneOptions};
 use caustique::path_class::Effect;
 use caustique::pipeline::check::check_settings;
 use caustique::pipeline::choose::{Chosen, choose};
 use caustique::pipeline::plan::{self, PlanInput};
-use caustique::pipeline::{Loaded, OpenFinish, finish, memory, with_light_paths};
+use caustique::pipeline::{Loaded, OpenFinish, finish, memory};
 use caustique::plan::Presence;
-use caustique::render::{Control, Method, Settings};
+use caustique::render::{Control, Method, MethodChoice, Settings, SettingsRequest};
 use caustique::report::data;
 use caustique::report::entry::{Entry, Metric};
 use caustique::report::equal_time::{Participants, Rules, render_in_turns};
@@ -143,8 +143,9 @@ fn single(method: MethodChoice) -> PyResult<RenderOptions> {
 
 /// The options of a run, completed by the options that all runs share, `common`.
 fn with_shared(run: RenderOptions, common: &RenderOptions) -> RenderOptions {
-    let RenderOptions { seed, frame_seed, max_depth, iterations, time, target_error, .. } = *common;
-    RenderOptions { seed, frame_seed, max_depth, iterations, time, target_error, scene: common.scene.clone(), ..run }
+    let SettingsRequest { seed, max_depth, iterations, time, target_error, .. } = common.settings;
+    let settings = SettingsRequest { seed, max_depth, iterations, time, target_error, ..run.settings };
+    RenderOptions { settings, frame_seed: common.frame_seed, scene: common.scene.clone(), ..run }
 }
 
 /// Reads a reference picture of this size from an image, a file, or an array (H, W, 3).
@@ -176,7 +177,7 @@ impl Callback<'_> {
 impl Comparison {
     /// Settings of all runs, and of the reference, before the size of the picture and the choices of `auto`.
     fn settings(&self) -> PyResult<(Vec<Settings>, Settings)> {
-        let of = |options: &RenderOptions| options.settings().map_err(raised);
+        let of = |options: &RenderOptions| options.settings_request().resolve().map_err(raised);
         let settings = self.runs.iter().map(|run| of(&run.options)).collect::<PyResult<_>>()?;
         let method = self.reference.method.unwrap_or(Method::Vcm);
         if method.has_one_map() {
@@ -187,7 +188,7 @@ impl Comparison {
 
     /// Time limit of each run in seconds; `None`: only the iterations are limited.
     fn time(&self) -> Option<f64> {
-        self.common.time.or(self.common.iterations.is_none().then_some(DEFAULT_TIME))
+        self.common.settings.time.or(self.common.settings.iterations.is_none().then_some(DEFAULT_TIME))
     }
 
     fn run(
@@ -204,7 +205,7 @@ impl Comparison {
         let (entries, mut finishes) = self.entries((scene, camera), settings, callback)?;
         memory::check_all(View::new(built, camera), entries.iter().map(|entry| &entry.settings))?;
         let reference = reference.unwrap_or_else(|| self.render_reference(own, View::new(built, camera), callback));
-        let RenderOptions { seed, iterations, .. } = self.common;
+        let SettingsRequest { seed, iterations, .. } = self.common.settings;
         let rules = Rules {
             time: self.time(),
             iterations,
@@ -258,12 +259,11 @@ impl Comparison {
         let view = View::new(&scene.loaded.scene, camera);
         let (mut entries, mut finishes, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
         for (Run { name, options }, settings) in self.runs.iter().zip(settings) {
-            let settings = with_light_paths(settings, options.photons, camera.size());
-            let limited = RenderOptions { time: self.time(), ..options.clone() };
-            let mut method = limited.method_request()?;
-            let chosen = choose(&mut method, settings, view, |_| true, &callback.caller.stop());
+            let settings = settings.with_light_paths(options.settings.photons, camera.size());
+            let limited = SettingsRequest { time: self.time(), ..options.settings_request() };
+            let chosen = choose(&limited, settings, view, |_| true, &callback.caller.stop());
             let decided = chosen.spent();
-            let (max_depth, switches) = (self.common.max_depth, scene.options.switches());
+            let (max_depth, switches) = (self.common.settings.max_depth, scene.options.switches());
             let plan = plan::plan(PlanInput { chosen: &chosen, max_depth, switches }, view, &scene.loaded.removed);
             let Chosen { settings, .. } = chosen;
             warnings
@@ -294,12 +294,12 @@ impl Comparison {
         let ends = match (self.reference.iterations, self.reference.time) {
             (None, None) => match self.time() {
                 Some(time) => (None, Some(8.0 * time)),
-                None => (self.common.iterations.map(|n| n.saturating_mul(16).max(2)), None),
+                None => (self.common.settings.iterations.map(|n| n.saturating_mul(16).max(2)), None),
             },
             limits => limits,
         };
         let settings = Settings { method, iterations: ends.0, time: ends.1, target_error: None, ..settings };
-        let settings = with_light_paths(settings, None, camera.size());
+        let settings = settings.with_light_paths(None, camera.size());
         let halves = Halves::render(scene, camera, &settings, |iterations, seconds| {
             callback.call(json!({"run": null, "iterations": iterations, "seconds": seconds}))
         });

@@ -137,7 +137,7 @@ impl Scene {
             let remedy = format!("go on with resume='{}', or start anew with overwrite=True", path.display());
             checkpoint::check_replaceable(path, run.overwrite, &remedy).map_err(raised)?;
         }
-        if !self.identity.of_files && (render.shard.is_some() || saving.is_some() || run.resume.is_some()) {
+        if !self.identity.of_files && (render.settings.shard.is_some() || saving.is_some() || run.resume.is_some()) {
             let cause = "render: shard, checkpoint and resume need a scene that another process can read";
             return Err(usage(
                 cause,
@@ -190,7 +190,7 @@ impl Scene {
         keywords.check_all_taken()?;
         let done = work(py, threads, |caller| {
             let picture = render.picture_request()?;
-            let planned = plan_picture(picture, &self.path, &self.loaded, &caller.stop())?;
+            let planned = plan_picture(&picture, &self.path, &self.loaded, &caller.stop())?;
             Ok(json!(planned.plan))
         })?;
         to_python(py, &done.whole()?)

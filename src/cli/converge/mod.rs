@@ -19,7 +19,7 @@ use caustique::image::tonemap::Look;
 use caustique::pipeline::check::check_settings;
 use caustique::pipeline::choose::{Chosen, choose};
 use caustique::pipeline::plan::{self, PlanInput};
-use caustique::pipeline::{Loaded, OpenFinish, memory, with_light_paths};
+use caustique::pipeline::{Loaded, OpenFinish, memory};
 use caustique::plan::switch::Removed;
 use caustique::render::{Control, Settings};
 use caustique::report::crop::Window;
@@ -152,13 +152,9 @@ fn windows(args: &ConvergeArgs, camera: &Camera) -> Result<Vec<Window>> {
 /// choices.
 fn choose_all(args: &ConvergeArgs, runs: Vec<Run>, view: View<'_>) -> Result<Vec<(Run, Chosen)>> {
     let choose_one = |mut run: Run| {
-        let Settings { max_depth, seed, .. } = run.entry.settings;
-        let (iterations, time) = (args.iterations, time(args));
-        let limits = move |settings| Settings { max_depth, seed, iterations, time, ..settings };
-        let settings = with_light_paths(run.entry.settings.clone(), run.args.photons, view.camera.whole()[0]);
+        let settings = run.entry.settings.clone().with_light_paths(run.request.photons, view.camera.whole()[0]);
         let chosen = {
-            let mut method = run.args.method_request()?.map_candidates(limits);
-            let work = || choose(&mut method, settings, view, |_| true, &Interrupt::stop());
+            let work = || choose(&run.request, settings, view, |_| true, &Interrupt::stop());
             args.progress.during("choosing a method", work)
         };
         if let Some(choice) = &chosen.choice {
@@ -181,7 +177,7 @@ fn open_finishes(
     let mut printed = HashSet::new();
     let mut entries = Vec::new();
     let mut finishes = Vec::new();
-    for (Run { mut entry, args: options }, chosen) in runs {
+    for (Run { mut entry, args: options, .. }, chosen) in runs {
         let (max_depth, switches) = (args.max_depth, args.scene.switches());
         let plan = plan::plan(PlanInput { chosen: &chosen, max_depth, switches }, view, removed);
         let new: Vec<String> = plan.warnings.into_iter().filter(|warning| printed.insert(warning.clone())).collect();

@@ -1,10 +1,11 @@
 //! The options of `caustique converge`.
 
 use crate::cli::progress::Form;
+use caustique::argument::{Ranged, finite, positive, threads};
 use caustique::image::tonemap::ToneMap;
-use caustique::options::number::{Ranged, finite, positive, threads};
-use caustique::options::{MethodChoice, SceneOptions, SizeOptions};
+use caustique::options::{SceneOptions, SizeOptions};
 use caustique::peers::Renderer;
+use caustique::render::MethodChoice;
 use caustique::report::crop::Window;
 use caustique::report::entry::Metric;
 use caustique::scene::CameraRequest;

@@ -5,8 +5,8 @@ use crate::cli::layout;
 use crate::cli::render::RenderArgs;
 use crate::cli::usage;
 use caustique::error::{Error, ErrorKind, Result};
-use caustique::options::{MethodChoice, RenderOptions};
-use caustique::render::{Method, Settings, TimeSpent};
+use caustique::options::RenderOptions;
+use caustique::render::{Method, MethodChoice, Settings, SettingsRequest, TimeSpent};
 use caustique::report::entry::Entry;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Command, FromArgMatches};
@@ -20,6 +20,8 @@ const HEADINGS_OF_RUN: [&str; 3] = ["Method", "Finish", "Expert"];
 pub struct Run {
     /// Name and settings of the run for the report. The finish is set when its libraries have been found.
     pub entry: Entry,
+    /// The requested settings of the run, with its limits.
+    pub request: SettingsRequest,
     /// Options of the run, those of `caustique render`.
     pub args: RenderOptions,
 }
@@ -79,19 +81,20 @@ fn parse(args: &ConvergeArgs, name: &str, options: &str, words: Vec<String>) -> 
     let matches = command.clone().try_get_matches_from(line).map_err(explain)?;
     check_options_of_run(&command, &matches)?;
     let render = RenderArgs::from_arg_matches(&matches).map_err(explain)?;
-    let settings = Settings {
-        max_depth: args.max_depth.unwrap_or(u32::MAX),
+    let request = SettingsRequest {
+        max_depth: args.max_depth,
         seed: args.seed,
-        classes: args.scene.switches().classes(),
-        iterations: None,
-        time: None,
-        ..render.picture_request()?.method.settings().clone()
+        switches: args.scene.switches(),
+        iterations: args.iterations,
+        time: super::time(args),
+        ..render.picture_request()?.settings
     };
+    let settings = Settings { iterations: None, time: None, ..request.resolve()? };
     let entry =
         Entry { name: name.into(), options: options.into(), settings, decided: TimeSpent::default(), finish: None };
     let mut options = render.options;
     options.no_finish |= args.no_finish;
-    Ok(Run { entry, args: options })
+    Ok(Run { entry, request, args: options })
 }
 
 /// Fails if an option concerns neither the method nor the finish of one run.

@@ -63,7 +63,7 @@ pub fn render_loaded(args: &RenderArgs, loaded: &Loaded, control: Control) -> Re
 }
 
 /// Checks the options of a render and its files. Returns the request for the pipeline.
-fn check(args: &RenderArgs) -> Result<Request<'_>> {
+fn check(args: &RenderArgs) -> Result<Request> {
     let picture = args.picture_request()?;
     let layers = args.selection()?;
     output::check_render(&args.output)?;

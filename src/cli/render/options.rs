@@ -3,10 +3,11 @@
 use super::preview::Target;
 use crate::cli::output::PictureArgs;
 use crate::cli::progress::Form;
+use caustique::argument::Elsewhere;
 use caustique::error::{Error, Result};
 use caustique::film::Selection;
-use caustique::options::{RenderOptions, RunOptions, is_pattern, path_of_frame, takes};
-use caustique::pipeline::{MethodRequest, PictureRequest, Saving};
+use caustique::options::{RenderOptions, RunOptions, is_pattern, path_of_frame};
+use caustique::pipeline::{PictureRequest, Saving};
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -29,6 +30,7 @@ pub struct RenderArgs {
     #[arg(short, long, value_name = "OUT.exr", help_heading = "Output")]
     #[arg(default_value = "", hide_default_value = true, value_parser = OsStringValueParser::new().map(PathBuf::from))]
     #[serde(skip)]
+    #[arg(not_in_python = "the picture is an Image: its method save writes it")]
     pub output: PathBuf,
 
     #[command(flatten)]
@@ -39,6 +41,7 @@ pub struct RenderArgs {
     #[arg(long, help_heading = "Running")]
     #[serde(skip)]
     #[arg(hide_short_help = true)]
+    #[arg(not_in_python = "a Scene is one frame")]
     pub skip_existing: bool,
 
     /// After the last frame, finish the frames again, each with up to two neighbours on each side: they flicker less
@@ -48,6 +51,7 @@ pub struct RenderArgs {
     #[arg(long, requires = "frames", conflicts_with = "no_finish", help_heading = "Finish")]
     #[serde(skip)]
     #[arg(hide_short_help = true)]
+    #[arg(not_in_python = "a Scene is one frame", in_stages = false)]
     pub temporal: bool,
 
     #[command(flatten)]
@@ -60,6 +64,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "OUT.usda", help_heading = "Output")]
     #[serde(skip)]
     #[arg(hide_short_help = true)]
+    #[arg(not_in_python = "a file beside the EXR")]
     pub usd_layer: Option<PathBuf>,
 
     /// Show the picture while it renders: in a file that is rewritten every few seconds, or in the viewer 'tev'
@@ -68,6 +73,7 @@ pub struct RenderArgs {
     /// this machine
     #[arg(long, value_name = "FILE.png|FILE.exr|tev", help_heading = "Running")]
     #[serde(skip)]
+    #[arg(not_in_python = "the callback progress shows how a render goes")]
     pub preview: Option<Target>,
     /// Also write a picture per sampling technique, weighted and unweighted, as EXR and PNG
     ///
@@ -75,10 +81,12 @@ pub struct RenderArgs {
     /// layer Noisy
     #[arg(long, value_name = "DIR", help_heading = "Expert")]
     #[serde(skip)]
+    #[arg(not_in_python = "files beside the EXR")]
     pub debug_techniques: Option<PathBuf>,
     /// Form of the reports on stderr
     #[arg(long, value_enum, default_value_t = Form::Auto, help_heading = "Running")]
     #[serde(skip)]
+    #[arg(not_in_python = "its progress is a callback")]
     pub progress: Form,
     /// Whether the outputs have their default names, which a message then gives.
     #[arg(skip)]
@@ -91,15 +99,13 @@ impl RenderArgs {
     ///
     /// # Errors
     /// Options contradict each other.
-    pub fn picture_request(&self) -> Result<PictureRequest<'_>> {
+    pub fn picture_request(&self) -> Result<PictureRequest> {
         let mut request = self.options.picture_request()?;
         if self.debug_techniques.is_none() {
             return Ok(request);
         }
-        match &mut request.method {
-            MethodRequest::Named(settings) if takes("debug_techniques", settings.method) => settings.techniques = true,
-            _ => return Err(self.options.no_effect("debug_techniques", self.options.method.0, "vcm")),
-        }
+        request.settings.techniques = true;
+        request.settings.resolve()?;
         if self.run.checkpoint.is_some() || self.run.resume.is_some() {
             let error = Error::usage("pictures per technique are not part of a checkpoint");
             return Err(error.hint("leave --debug-techniques out"));

@@ -112,7 +112,7 @@ fn first_alone(args: &RenderArgs, frames: Frames) -> Frames {
 
 /// Whether the output of the frame is there and whole: a copy may have been cut off, and an empty file is a placeholder.
 fn is_there(args: &RenderArgs) -> bool {
-    let has_sums = || args.options.shard.is_none() || is_shard(&args.output).is_ok_and(|is_shard| is_shard);
+    let has_sums = || args.options.settings.shard.is_none() || is_shard(&args.output).is_ok_and(|is_shard| is_shard);
     output::is_whole(&args.output) && has_sums()
 }
 
@@ -139,7 +139,7 @@ fn check_temporal(args: &RenderArgs) -> Result<()> {
             "--temporal: frames of one seed have equal noise, which their average keeps",
             "leave --frame-seed same out",
         ),
-        options if options.shard.is_some() => (
+        options if options.settings.shard.is_some() => (
             "--temporal: a shard is not finished",
             "render with --layers all,Motion,Quarter, merge the shards of each frame, and finish the merged frames with \
              'caustique finish'",

@@ -6,10 +6,10 @@ mod outbox;
 
 use super::render::{self, RenderArgs};
 use super::{parse_render, signals};
+use caustique::argument::threads;
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::files;
 use caustique::film::{LayerSet, Plane};
-use caustique::options::number::threads;
 use caustique::options::{FinishOptions, SceneOptions};
 use caustique::pipeline::edit::{Edit, EditableScene};
 use caustique::pipeline::finish;
@@ -248,9 +248,9 @@ fn one_frame(options: &SceneOptions) -> Error {
 fn open_finish(
     open: &mut Option<(FinishOptions, usize, OpenFinish)>,
     args: &RenderArgs,
-    picture: &PictureRequest<'_>,
+    picture: &PictureRequest,
 ) -> Result<()> {
-    let (options, levels) = (&args.options.finish, picture.method.settings().levels.count);
+    let (options, levels) = (&args.options.finish, picture.settings.resolve()?.levels.count);
     let same = |of: &FinishOptions| of.denoise == options.denoise && of.model == options.model;
     // The number of levels matters to the network alone.
     let is_open =

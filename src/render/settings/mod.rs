@@ -1,16 +1,21 @@
 //! Settings of a render: the method and its parameters, stop conditions, and the shard.
 
 mod candidate;
+mod check;
 mod counts;
 mod levels;
 mod method;
+mod request;
 mod shard;
+mod values;
 
 pub use candidate::Candidate;
 pub use counts::{Counts, LIGHT_PATH_STEPS, MAX_CONNECTIONS, MAX_LIGHT_PATHS_PER_PIXEL};
 pub use levels::Levels;
 pub use method::{BandwidthRule, DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS, Method};
+pub use request::SettingsRequest;
 pub use shard::{MAX_SHARDS, Shard};
+pub use values::{BandwidthChoice, GridChoice, MethodChoice, OnOff};
 
 use crate::camera::Camera;
 use crate::estimator::rule::chi_squared::ChiSquaredSettings;
@@ -192,6 +197,13 @@ impl Settings {
         } else {
             pixels.max(self.method.default_photons())
         }
+    }
+
+    /// The settings with a number of light paths per iteration: `photons`, or if it is `None` the default for a whole
+    /// picture of this width and height.
+    #[must_use]
+    pub fn with_light_paths(self, photons: Option<u32>, size: (u32, u32)) -> Settings {
+        Settings { photons: photons.unwrap_or(self.default_photons(size)), ..self }
     }
 
     /// Makes the tracer of camera paths for a render with these settings.

@@ -1,6 +1,7 @@
 //! Division of a render's iterations among machines.
 
 use serde::{Deserialize, Serialize};
+use std::str::FromStr;
 
 /// Largest number of shards of a render.
 pub const MAX_SHARDS: u64 = 1_000_000;
@@ -18,5 +19,19 @@ impl Shard {
     /// Whether `count` is in range and `index` is below it.
     pub fn is_sound(self) -> bool {
         self.index < self.count && self.count <= MAX_SHARDS
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let parts = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+        match parts {
+            Some((index, count)) if (Shard { index, count }).is_sound() => Ok(Shard { index, count }),
+            Some((_, 0)) => Err("there is no shard of 0".into()),
+            Some((_, count)) if count <= MAX_SHARDS => Err(format!("shards of {count} are 0 to {}", count - 1)),
+            Some(_) => Err(format!("there are at most {MAX_SHARDS} shards")),
+            None => Err("it must be I/N, such as 0/4".into()),
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! Parsers of option values: numbers in a range, lists of numbers, fractions.
+//! Arguments of the command line: parsers of their values, and what other faces of the program make of them.
 
 use clap::Arg;
 use clap::builder::ArgExt;
@@ -67,6 +67,54 @@ impl Ranged for Arg {
             below_max: matches!(high, Excluded(_)),
         };
         self.value_parser(between(low, high)).add(described)
+    }
+}
+
+/// Extends clap's arguments by what Python and USD make of an option.
+pub trait Elsewhere {
+    /// The option is no argument in Python, for this reason.
+    fn not_in_python(self, reason: &'static str) -> Self;
+    /// The option is an argument of this name in Python, where it differs from the name of the field.
+    fn in_python(self, name: &'static str) -> Self;
+    /// The option is an argument of this name of Python's `Scene`.
+    fn of_scene(self, name: &'static str) -> Self;
+    /// Whether the render settings of a USD stage may set the option, where its heading does not tell.
+    fn in_stages(self, allowed: bool) -> Self;
+}
+
+/// Why an option is no argument in Python.
+#[derive(Clone, Copy, Debug)]
+pub struct NotInPython(pub &'static str);
+/// Name of an option in Python.
+#[derive(Clone, Copy, Debug)]
+pub struct InPython(pub &'static str);
+/// Name of an option as an argument of Python's `Scene`.
+#[derive(Clone, Copy, Debug)]
+pub struct OfScene(pub &'static str);
+/// Whether the render settings of a USD stage may set an option.
+#[derive(Clone, Copy, Debug)]
+pub struct InStages(pub bool);
+
+impl ArgExt for NotInPython {}
+impl ArgExt for InPython {}
+impl ArgExt for OfScene {}
+impl ArgExt for InStages {}
+
+impl Elsewhere for Arg {
+    fn not_in_python(self, reason: &'static str) -> Arg {
+        self.add(NotInPython(reason))
+    }
+
+    fn in_python(self, name: &'static str) -> Arg {
+        self.add(InPython(name))
+    }
+
+    fn of_scene(self, name: &'static str) -> Arg {
+        self.add(OfScene(name))
+    }
+
+    fn in_stages(self, allowed: bool) -> Arg {
+        self.add(InStages(allowed))
     }
 }
 
