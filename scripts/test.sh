@@ -177,6 +177,13 @@ join_beside
 if [ "$SECONDS" -lt "$long_within" ]; then
     tests 'cargo test, long' "${rust[@]}" --ignored
     other_blenders CAUSTIQUE_LONG=1
+    # Clippy's lint `incompatible_msrv` already names newer functions of the standard library.
+    oldest=$(sed -n 's/^rust-version *= *"\([0-9.]*\)".*/\1/p' Cargo.toml | head -n 1)
+    if cargo "+$oldest.0" --version >/dev/null 2>&1; then
+        part "Rust $oldest" cargo "+$oldest.0" check --locked --target-dir target/oldest
+    else
+        without "Rust $oldest" "it is not installed: rustup toolchain install $oldest.0"
+    fi
 else
     without 'cargo test, long' 'scripts/test.sh --long runs them'
 fi

@@ -19,6 +19,7 @@ const EMBREE_BYTES_PER_THREAD: u64 = 16 << 20;
 const MAX_RADIANCE: f32 = 1e30;
 
 /// A scene file, and how it is read.
+#[derive(Default)]
 pub struct SceneRequest {
     /// Path of the scene file.
     pub path: PathBuf,

@@ -92,12 +92,26 @@ class Sources(unittest.TestCase):
         )
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
 
+    def test_the_crate_has_what_a_library_needs_and_is_small(self):
+        """Registries refuse crates above 10 MB, packed; these files are not packed yet."""
+        listed = subprocess.run(
+            ["cargo", "package", "--list", "--allow-dirty", "--package", "caustique"],
+            cwd=support.ROOT,
+            check=True,
+            capture_output=True,
+            text=True,
+        )
+        files = [support.ROOT / name for name in listed.stdout.splitlines()]
+        self.assertLess(sum(file.stat().st_size for file in files if file.exists()), 8e6)
+        self.assertIn(support.ROOT / "examples" / "picture.rs", files)
+
     def test_all_files_state_one_version(self):
         def text(name):
             return (support.ROOT / name).read_text(encoding="utf-8")
 
         version = re.search(r'^version = "([\d.]+)"', text("Cargo.toml"), re.MULTILINE)[1]
         addon = "scripts/blender/caustique_addon/"
+        self.assertEqual(set(re.findall(r'path = .*version = "([\d.]+)"', text("Cargo.toml"))), {version})
         self.assertIn(f"\nversion: {version}\n", text("CITATION.cff"))
         self.assertIn(f'\nversion = "{version}"\n', text(addon + "blender_manifest.toml"))
         self.assertIn(f'"version": ({version.replace(".", ", ")}),', text(addon + "__init__.py"))

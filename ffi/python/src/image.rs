@@ -4,6 +4,7 @@ use crate::error::{raised, usage};
 use crate::keywords::choice;
 use crate::value::{to_json, to_python};
 use caustique::error::{Error, ErrorKind};
+use caustique::face::write;
 use caustique::film::{Layer, LayerSet, Plane, Sample, describe};
 use caustique::image::exr::{self, Attributes};
 use caustique::image::png;
@@ -215,19 +216,9 @@ impl Image {
         let colour_space = choice("save: colorspace", colorspace)?;
         let tonemap = choice("save: tonemap", tonemap)?;
         let look = Look { exposure, tonemap, contrast: choice("save: contrast", contrast)? };
-        let is = |extension: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension));
-        let set = &self.set;
-        let written = py.detach(|| match () {
-            () if is("exr") => {
-                let options = exr::Options { compression, naming, half, multi_part, colour_space };
-                exr::write_followed(&path, set, &self.attributes, options, |file| {
-                    self.sums.as_ref().map_or(Ok(()), |sums| sums.write(file))
-                })
-            }
-            () if is("png") => png::write_tonemapped(&path, &set.beauty()?, look),
-            () => Err(Error::new(ErrorKind::Usage, path.display(), "the name ends neither in .exr nor in .png")
-                .hint("an EXR holds all layers, a PNG is a picture to look at")),
-        });
+        let options = exr::Options { compression, naming, half, multi_part, colour_space };
+        let Image { set, attributes, sums } = self;
+        let written = py.detach(|| write(&path, set, attributes, sums.as_ref(), options, look));
         written.map_err(raised)
     }
 }
