@@ -10,7 +10,7 @@
 //! the bias there, too ([`PixelAccumulator::add`]).
 //!
 //! Vertex connection and merging with one bandwidth has no larger level. There the same photons within a quarter of the
-//! radius give a second estimate, whose bias is 1/16 of `b`, or 1/4 at edges and on narrow caustics. The difference of the
+//! bandwidth give a second estimate, whose bias is 1/16 of `b`, or 1/4 at edges and on narrow caustics. The difference of the
 //! two, 15/16 to 3/4 of `b`, is taken for `b`.
 //!
 //! Levels show the bias where light varies smoothly over the kernel. At edges narrower than the bandwidth, bias falls more

@@ -14,7 +14,7 @@ use std::cmp::Ordering;
 pub const FAR: f32 = 1e10;
 
 /// Correction of the difference between two bandwidth levels, as a fraction of it, for light gathered in media. Bias
-/// grows with the squared radius, which grows by 2^(2/3) from level to level in media, and by 2 on surfaces. With the
+/// grows with the squared bandwidth, which grows by 2^(2/3) from level to level in media, and by 2 on surfaces. With the
 /// correction `1 / (2^(2/3) - 1) - 1` a difference is the bias of the smaller level for both.
 const VOLUME_DIFFERENCE: f32 = 0.702_414_4;
 
@@ -92,9 +92,9 @@ pub struct PixelAccumulator {
     pub iterations: u32,
     /// Counts of the iterations that were left out because a value was not finite, by cause.
     pub rejected: Rejected,
-    /// Initial gathering radius of the largest bandwidth level, by kind of photons (scene units).
+    /// Initial bandwidth of the largest bandwidth level, by kind of photons (scene units).
     pub bandwidths: ByKind<f32>,
-    /// Initial gathering radius of the largest bandwidth level for photons in media (scene units); 0 without media.
+    /// Initial bandwidth of the largest bandwidth level for photons in media (scene units); 0 without media.
     pub volume_bandwidth: f32,
     /// First hit of the camera path of the first accumulated iteration.
     first: FirstVisible,
@@ -118,7 +118,7 @@ impl Default for FirstVisible {
 }
 
 impl PixelAccumulator {
-    /// The empty accumulator of a pixel with `levels` bandwidth levels and these initial radii (scene units). Sums of
+    /// The empty accumulator of a pixel with `levels` bandwidth levels and these initial bandwidths (scene units). Sums of
     /// light are exact on grids in units of 2^`exponent`: if all light of the scene is scaled by a power of two, and
     /// `exponent` with it, the sums scale exactly ([`Grids::new`]).
     pub fn new(levels: usize, exponent: i32, bandwidths: ByKind<f32>) -> PixelAccumulator {
@@ -214,7 +214,7 @@ impl PixelAccumulator {
 
     /// Mean over iterations of the radiance of the next larger bandwidth level minus that of the picture level, and the
     /// variance of this mean. With one level that merges, the radiance minus that of merging within a quarter of the
-    /// radius; with one level otherwise, `None`.
+    /// bandwidth; with one level otherwise, `None`.
     pub fn difference(&self) -> Option<[DVec3; 2]> {
         let count = f64::from(self.iterations);
         let scale = if self.others.len() == 1 { f64::from(INNER_AREAS) } else { 1.0 };
@@ -512,7 +512,7 @@ mod tests {
     use crate::random::{Domain, Purpose, Stream};
     use crate::transport::{Features, FirstHit};
 
-    /// With a bias of r^2 on surfaces and in media, where radii of levels differ by other factors, differences of
+    /// With a bias of r^2 on surfaces and in media, where bandwidths of levels differ by other factors, differences of
     /// levels equal the sum of both biases.
     #[test]
     fn level_differences_equal_the_bias_on_surfaces_and_in_media() {

@@ -158,12 +158,12 @@ fn columns(shape: &Shape) -> Vec<Column> {
     }
     for (kind, name) in radius_layers(kinds) {
         for level in 0..levels {
-            let radius = move |at: &PixelInput<'_>| at.bandwidths.radius2(at.index, at.pixel, kind, level).sqrt();
+            let radius = move |at: &PixelInput<'_>| at.bandwidths.bandwidth2(at.index, at.pixel, kind, level).sqrt();
             columns.push(Column::one(format!("{name}{}", level + 1), radius));
         }
     }
     for level in (0..levels).filter(|_| volume_photons) {
-        let radius = move |at: &PixelInput<'_>| at.bandwidths.volume_radius(at.pixel, level);
+        let radius = move |at: &PixelInput<'_>| at.bandwidths.volume_bandwidth(at.pixel, level);
         columns.push(Column::one(format!("VolumeRadius{}", level + 1), radius));
     }
     for quarter in 0..QUARTERS {

@@ -119,15 +119,15 @@ mod tests {
     /// The Laplacian is zero for a constant and 4 for x^2 + y^2, at any bandwidth.
     #[test]
     fn the_laplacian_of_the_kernel_estimates_that_of_the_field() {
-        for radius2 in [0.25f32, 1.0, 9.0] {
-            let area = f64::from(PI * radius2);
+        for bandwidth2 in [0.25f32, 1.0, 9.0] {
+            let area = f64::from(PI * bandwidth2);
             let of = |field: &dyn Fn(f64) -> f64| {
                 area * integral(|s| {
-                    f64::from(laplacian(f32x8::splat(s as f32)).to_array()[0] / (radius2 * radius2))
-                        * field(s * f64::from(radius2))
+                    f64::from(laplacian(f32x8::splat(s as f32)).to_array()[0] / (bandwidth2 * bandwidth2))
+                        * field(s * f64::from(bandwidth2))
                 })
             };
-            assert!(of(&|_| 1.0).abs() < 1e-3 / f64::from(radius2));
+            assert!(of(&|_| 1.0).abs() < 1e-3 / f64::from(bandwidth2));
             assert!((of(&|d2| d2) - 4.0).abs() < 1e-3);
         }
     }

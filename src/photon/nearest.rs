@@ -30,7 +30,7 @@ impl<P> Default for Nearest<P> {
 impl<P: Located> Nearest<P> {
     /// Squared distance from `p` to its `k`-th nearest photon on the surface with normal `ng`, among those nearer than
     /// `sqrt(limit2)`; `None` if there are fewer than `k`. `1 <= k <=` [`MAX_NEIGHBOURS`].
-    pub fn radius2(&mut self, map: &PhotonMap<P>, p: Vec3, ng: Vec3, k: usize, limit2: f32) -> Option<f32> {
+    pub fn bandwidth2(&mut self, map: &PhotonMap<P>, p: Vec3, ng: Vec3, k: usize, limit2: f32) -> Option<f32> {
         let guess2 = (self.last2 * (GUESS_RATIO * GUESS_RATIO)).min(limit2);
         let mut found = None;
         if guess2 > 0.0 {
@@ -48,7 +48,7 @@ impl<P: Located> Nearest<P> {
         found
     }
 
-    /// As [`Nearest::radius2`], without a guess of the distance.
+    /// As [`Nearest::bandwidth2`], without a guess of the distance.
     fn search(&mut self, map: &PhotonMap<P>, p: Vec3, ng: Vec3, k: usize, limit2: f32) -> Option<f32> {
         // The k smallest distances, sorted: k is small, and an insertion moves half of them.
         let best = &mut self.distances2;
@@ -64,25 +64,25 @@ impl<P: Located> Nearest<P> {
         best.clear();
         // A photon lies at the bound itself, so the start is just above it.
         let start = if bound < limit2 { bound.next_up() } else { limit2 };
-        map.traverse(p, start, |photon, distance2, radius2| {
+        map.traverse(p, start, |photon, distance2, bandwidth2| {
             // The leaf was tested before the radius shrank.
-            if distance2 >= radius2 || !same_surface(photon, ng) {
-                radius2
+            if distance2 >= bandwidth2 || !same_surface(photon, ng) {
+                bandwidth2
             } else {
-                insert(best, k, distance2, radius2)
+                insert(best, k, distance2, bandwidth2)
             }
         });
         (best.len() == k).then(|| best[k - 1])
     }
 }
 
-/// Inserts a squared distance into `best`, the `k` smallest so far in ascending order. Returns the squared radius
+/// Inserts a squared distance into `best`, the `k` smallest so far in ascending order. Returns the squared bandwidth
 /// within which further photons matter.
-fn insert(best: &mut Vec<f32>, k: usize, distance2: f32, radius2: f32) -> f32 {
+fn insert(best: &mut Vec<f32>, k: usize, distance2: f32, bandwidth2: f32) -> f32 {
     best.insert(best.partition_point(|&d| d <= distance2), distance2);
     best.truncate(k);
     // Only photons strictly nearer can replace the k-th.
-    if best.len() == k { best[k - 1].min(radius2) } else { radius2 }
+    if best.len() == k { best[k - 1].min(bandwidth2) } else { bandwidth2 }
 }
 
 #[cfg(test)]
@@ -122,8 +122,8 @@ mod tests {
             let mut distances: Vec<f32> =
                 photons.iter().filter(|photon| photon.ng.z > 0.0).map(|photon| photon.p.distance_squared(p)).collect();
             distances.sort_by(f32::total_cmp);
-            assert_eq!(nearest.radius2(&map, p, Vec3::Z, k, f32::INFINITY), Some(distances[k - 1]));
-            assert_eq!(nearest.radius2(&map, p, Vec3::Z, k, distances[k - 1]), None);
+            assert_eq!(nearest.bandwidth2(&map, p, Vec3::Z, k, f32::INFINITY), Some(distances[k - 1]));
+            assert_eq!(nearest.bandwidth2(&map, p, Vec3::Z, k, distances[k - 1]), None);
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::camera::Camera;
 use crate::error::{Error, ErrorKind, Result};
 use crate::plan::Search;
 use crate::render::output::layer_shape;
-use crate::render::{Candidate, InitialBandwidth, MIN_USER_RADIUS_RATIO, Settings};
+use crate::render::{Candidate, InitialBandwidth, MIN_USER_BANDWIDTH_RATIO, Settings};
 use crate::scene::{Scene, View};
 use crate::transport::Indirect;
 use std::path::Path;
@@ -90,7 +90,7 @@ fn check_media(settings: &Settings, path: &Path, scene: &Scene) -> Result<()> {
 /// so that most of the area of a density estimate lies outside.
 fn check_bandwidth(settings: &Settings, path: &Path, scene: &Scene) -> Result<()> {
     let radius = scene.lights.sky().radius;
-    let least = MIN_USER_RADIUS_RATIO * radius;
+    let least = MIN_USER_BANDWIDTH_RATIO * radius;
     let (cause, bound) = match settings.initial_bandwidth {
         InitialBandwidth::Fixed(length) if length < least => (
             format!(

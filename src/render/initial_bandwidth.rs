@@ -4,7 +4,7 @@
 //! largest bandwidth is the distance to the k-th nearest photon of the kind on the surface around the gathering point
 //! of its pilot path. It is at most [`SCREEN_CAP`] (by default) of the picture's width at that distance; this cap is
 //! also the bandwidth if fewer than k photons lie within it. In a strongly magnified view hardly any photon would lie
-//! within the cap, and indirect light would be missing. So the cap is at least the radius in which one photon is
+//! within the cap, and indirect light would be missing. So the cap is at least the bandwidth in which one photon is
 //! expected where photon density is typical. A pixel whose pilot path gathers nowhere gets the median of the others; if
 //! there are none, the cap at the distance of the scene's radius.
 
@@ -17,31 +17,31 @@ use bumpalo::Bump;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Largest initial gathering radius over the width that the picture covers at the gathering point. A kernel wider than
+/// Largest initial bandwidth over the width that the picture covers at the gathering point. A kernel wider than
 /// a tenth of the picture has no local information.
 pub const SCREEN_CAP: f32 = 0.05;
-/// Initial gathering radius over the width of a pixel at the gathering point, for `--initial-bandwidth footprint`.
+/// Initial bandwidth over the width of a pixel at the gathering point, for `--initial-bandwidth footprint`.
 pub const FOOTPRINT_PIXELS: f32 = 3.0;
-/// Smallest gathering radius over the radius of the scene's bounding sphere. At a perfect focus the distance between
+/// Smallest bandwidth over the radius of the scene's bounding sphere. At a perfect focus the distance between
 /// photons is zero.
-pub const MIN_RADIUS_RATIO: f32 = 1e-7;
+pub const MIN_BANDWIDTH_RATIO: f32 = 1e-7;
 
-/// Smallest gathering radius that a user may set, over the radius of the scene's bounding sphere. It is a hundred steps
+/// Smallest bandwidth that a user may set, over the radius of the scene's bounding sphere. It is a hundred steps
 /// (2^-24) of single precision positions; the smallest of five levels is a quarter of it. Below that, distances of
 /// photons are rounding errors.
-pub const MIN_USER_RADIUS_RATIO: f32 = 1e-5;
+pub const MIN_USER_BANDWIDTH_RATIO: f32 = 1e-5;
 
 /// Half width, in pixels, of the square of pixels whose median [`initial_volume_bandwidths`] takes.
 const NEIGHBOURHOOD: usize = 3;
 
-/// Rule that sets the initial gathering radius of the largest bandwidth level of each pixel.
+/// Rule that sets the initial bandwidth of the largest bandwidth level of each pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum InitialBandwidth {
     /// Distance to the k-th nearest photon of the pilot iteration, which runs before the first one.
     Nearest(usize),
     /// [`FOOTPRINT_PIXELS`] times the width of a pixel at the gathering point.
     Footprint,
-    /// One radius for all pixels (scene units).
+    /// One bandwidth for all pixels (scene units).
     Fixed(f32),
 }
 
@@ -56,9 +56,9 @@ pub fn footprint(camera: &Camera, length: f32) -> f32 {
     FOOTPRINT_PIXELS * picture_width_at(camera, length) / camera.whole_width()
 }
 
-/// Initial gathering radius of the largest bandwidth level of every pixel, for the photons of each pilot map (photons
+/// Initial bandwidth of the largest bandwidth level of every pixel, for the photons of each pilot map (photons
 /// of the iteration that runs before the first), row by row (scene units). It is at most `widest` times the picture's
-/// width, or the radius in which one photon is expected if that is larger.
+/// width, or the bandwidth in which one photon is expected if that is larger.
 pub fn initial_bandwidths<const MAPS: usize>(
     camera_paths: &CameraPaths<'_>,
     rule: InitialBandwidth,
@@ -66,7 +66,7 @@ pub fn initial_bandwidths<const MAPS: usize>(
     seed: u64,
     pilots: [&PhotonMap; MAPS],
 ) -> Vec<[f32; MAPS]> {
-    let allowed = pilots.map(|pilot| radius_of_one(rule, pilot, f32::sqrt));
+    let allowed = pilots.map(|pilot| bandwidth_of_one(rule, pilot, f32::sqrt));
     bandwidths(camera_paths, rule, Bounds { widest, allowed }, seed, pilots, |arena, start| {
         camera_paths.gather_point(arena, start)
     })
@@ -77,7 +77,7 @@ pub fn initial_bandwidths<const MAPS: usize>(
 /// The position of the point on the path is random, and density near the camera differs from density further away. So
 /// each pixel takes the median of its neighbourhood, and the cap is derived from the picture's width at the surface
 /// behind. From inside a medium that cap may be so small that hardly any pixel finds a photon. So it is at least the
-/// radius in which one photon is expected.
+/// bandwidth in which one photon is expected.
 pub fn initial_volume_bandwidths(
     camera_paths: &CameraPaths<'_>,
     rule: InitialBandwidth,
@@ -85,7 +85,7 @@ pub fn initial_volume_bandwidths(
     seed: u64,
     pilot: &PhotonMap<VolumePhoton>,
 ) -> Vec<f32> {
-    let bounds = Bounds { widest, allowed: [radius_of_one(rule, pilot, f32::cbrt)] };
+    let bounds = Bounds { widest, allowed: [bandwidth_of_one(rule, pilot, f32::cbrt)] };
     let found =
         bandwidths(camera_paths, rule, bounds, seed, [pilot], |arena, start| camera_paths.volume_point(arena, start));
     medians(found.as_flattened(), camera_paths.camera.size().0 as usize)
@@ -107,13 +107,13 @@ fn medians(values: &[f32], width: usize) -> Vec<f32> {
 
 /// Radius (scene units) in which one photon is expected where photon density is typical: the distance to the k-th
 /// nearest photon of the pilot iteration over `root(k)`; 0 if it is unknown.
-fn radius_of_one<P: Located>(rule: InitialBandwidth, pilot: &PhotonMap<P>, root: impl Fn(f32) -> f32) -> f32 {
+fn bandwidth_of_one<P: Located>(rule: InitialBandwidth, pilot: &PhotonMap<P>, root: impl Fn(f32) -> f32) -> f32 {
     let InitialBandwidth::Nearest(k) = rule else { return 0.0 };
-    let one = median_radius2(pilot, k).sqrt() / root(k as f32);
+    let one = median_bandwidth2(pilot, k).sqrt() / root(k as f32);
     if one.is_finite() { one } else { 0.0 }
 }
 
-/// Upper bounds of initial gathering radii.
+/// Upper bounds of initial bandwidths.
 #[derive(Clone, Copy)]
 struct Bounds<const MAPS: usize> {
     /// Bound as a fraction of the picture's width at the gathering point.
@@ -123,7 +123,7 @@ struct Bounds<const MAPS: usize> {
 }
 
 impl<const MAPS: usize> Bounds<MAPS> {
-    /// Upper bound of the radius for photon map `map`, at a gathering point where the picture is `span` wide (scene
+    /// Upper bound of the bandwidth for photon map `map`, at a gathering point where the picture is `span` wide (scene
     /// units).
     fn at(self, map: usize, span: f32) -> f32 {
         (self.widest * span).max(self.allowed[map])
@@ -132,11 +132,11 @@ impl<const MAPS: usize> Bounds<MAPS> {
 
 /// Median over all photons of the squared distance to the k-th nearest photon (square scene units); infinite if there
 /// are too few.
-pub fn median_radius2<P: Located>(map: &PhotonMap<P>, k: usize) -> f32 {
+pub fn median_bandwidth2<P: Located>(map: &PhotonMap<P>, k: usize) -> f32 {
     const SAMPLES: usize = 256;
     let mut nearest = Nearest::default();
     let every = map.photons().iter().step_by(map.photons().len().div_ceil(SAMPLES).max(1));
-    let of = |photon: &P| nearest.radius2(map, photon.position(), photon.normal(), k, f32::INFINITY);
+    let of = |photon: &P| nearest.bandwidth2(map, photon.position(), photon.normal(), k, f32::INFINITY);
     let mut found: Vec<f32> = every.filter_map(of).collect();
     median(&mut found, f32::total_cmp).unwrap_or(f32::INFINITY)
 }
@@ -155,12 +155,12 @@ fn bandwidths<P: Located, const MAPS: usize>(
     if let InitialBandwidth::Fixed(r) = rule {
         return vec![[r; MAPS]; pixels];
     }
-    let least = MIN_RADIUS_RATIO * scene.lights.sky().radius;
+    let least = MIN_BANDWIDTH_RATIO * scene.lights.sky().radius;
     let of_point = |map: usize, nearest: &mut Nearest<P>, point: &GatherPoint| {
         let cap = bounds.at(map, picture_width_at(camera, point.length));
         let r = match rule {
             InitialBandwidth::Nearest(k) => {
-                nearest.radius2(pilots[map], point.p, point.ng, k, cap * cap).map_or(cap, f32::sqrt)
+                nearest.bandwidth2(pilots[map], point.p, point.ng, k, cap * cap).map_or(cap, f32::sqrt)
             }
             _ => footprint(camera, point.length).min(cap),
         };

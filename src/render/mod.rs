@@ -14,7 +14,7 @@ pub use account::{
     RenderStats, Rendered, ShardResult, StopReason, UnseenLight,
 };
 pub use clock::{Clock, Phases, TimeSpent, cpu_seconds, peak_memory};
-pub use initial_bandwidth::{FOOTPRINT_PIXELS, InitialBandwidth, MIN_USER_RADIUS_RATIO, SCREEN_CAP};
+pub use initial_bandwidth::{FOOTPRINT_PIXELS, InitialBandwidth, MIN_USER_BANDWIDTH_RATIO, SCREEN_CAP};
 pub use input::{Motion, RenderInput};
 pub(crate) use pass::Cost;
 pub use pass::{

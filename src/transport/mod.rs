@@ -11,7 +11,7 @@ pub use bidirectional::light_walk::{Deposits, LightVertices, Splat};
 pub use bidirectional::path::{path_radiance, path_sample};
 pub use bidirectional::photon_merge::MergePhoton;
 pub use bidirectional::{Bidirectional, Division, MergeLevels, PathKind, PathRecorder, Technique, TechniqueSet};
-pub use gather::bandwidths::{FoundPhotons, GatherBandwidths, LevelRadii, PhotonCounter};
+pub use gather::bandwidths::{FoundPhotons, GatherBandwidths, LevelBandwidths, PhotonCounter};
 pub use gather::photon_batch::Scratch;
 pub use gather::volume::Volume;
 pub use light::vertex_counts::VertexCounts;

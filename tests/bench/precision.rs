@@ -3,7 +3,7 @@
 //!
 //! `cargo bench --bench precision`. The figures are in the section "Precision" of `docs/lab/hard-cases.md`.
 
-use caustique::estimator::rule::memoryless::radius2_factor;
+use caustique::estimator::rule::memoryless::bandwidth2_factor;
 use caustique::math::{Affine3A, DAffine3, DVec3, Vec3};
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::render::Clock;
@@ -69,12 +69,12 @@ fn pixel_sums() {
 /// A squared radius multiplied by its factor a million times, compared with the explicit form.
 fn radii() {
     const ALPHA: f64 = 2.0 / 3.0;
-    let exact = radius2_factor(u64::from(MILLION), ALPHA);
+    let exact = bandwidth2_factor(u64::from(MILLION), ALPHA);
     let factor = |i: u32| (f64::from(i) + ALPHA) / (f64::from(i) + 1.0);
     let (ns_single, single) =
-        timed(MILLION, || (1..MILLION).fold(1f32, |radius2, i| (f64::from(radius2) * factor(i)) as f32));
-    let (ns_double, double) = timed(MILLION, || (1..MILLION).fold(1f64, |radius2, i| radius2 * factor(i)));
-    let error = |radius2: f64| (radius2 / exact - 1.0).abs();
+        timed(MILLION, || (1..MILLION).fold(1f32, |bandwidth2, i| (f64::from(bandwidth2) * factor(i)) as f32));
+    let (ns_double, double) = timed(MILLION, || (1..MILLION).fold(1f64, |bandwidth2, i| bandwidth2 * factor(i)));
+    let error = |bandwidth2: f64| (bandwidth2 / exact - 1.0).abs();
     row("a radius kept over 10^6 iterations", [error(f64::from(single)), error(double)], [ns_single, ns_double]);
 }
 

@@ -133,7 +133,7 @@ fn bandwidths_shrink_on_metal() {
             let camera = scene.camera(&square(SIZE)).expect("a camera");
             let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
             let count = rendered.pixels.len();
-            let radii = (0..count).map(|index| rendered.radius2(index, Kind::Caustic, 0).sqrt());
+            let radii = (0..count).map(|index| rendered.bandwidth2(index, Kind::Caustic, 0).sqrt());
             let radius = radii.sum::<f32>() / (count as f32 * first);
             let mean = rendered.pixels.iter().map(|pixel| pixel.mean(0).x).sum::<f64>() / count as f64;
             println!("{method:?}, {radius_rule:?}, {iterations}: {radius} of the first bandwidth, {mean:.3}");

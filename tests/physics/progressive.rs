@@ -6,7 +6,7 @@
 use crate::support;
 
 use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
-use caustique::estimator::rule::memoryless::radius2_factor;
+use caustique::estimator::rule::memoryless::bandwidth2_factor;
 use caustique::math::{DVec3, Vec3};
 use caustique::photon::{Kernel, Kind};
 use caustique::random::{Domain, QUARTERS, quarter};
@@ -165,7 +165,7 @@ fn errors_are_the_sums_over_bandwidths() {
     let fields: Vec<PixelField> =
         (0..128).map(|k| PixelField::new(Field::Square, (k % 8, k / 8), 1, radius, photons)).collect();
     for alpha in [2.0 / 3.0, 1.0] {
-        let moments = |i: u64, field: &PixelField| field.moments(radius * radius * radius2_factor(i, alpha));
+        let moments = |i: u64, field: &PixelField| field.moments(radius * radius * bandwidth2_factor(i, alpha));
         let means: Vec<f64> =
             fields.iter().map(|field| (1..=n).map(|i| moments(i, field).mean / n as f64).sum()).collect();
         let first: Vec<f64> = fields.iter().map(|f| f.moments(radius * radius).mean - f.truth).collect();
@@ -230,7 +230,7 @@ fn merging_alone_has_the_bias_of_its_bandwidths() {
         places.map(|place| PixelField::new(Field::Point, place, 4, radius, width * height)).collect();
     let alpha = Method::Vcm.default_alpha();
     let expected = |field: &PixelField| {
-        let mean = |i| field.moments(radius * radius * radius2_factor(i, alpha)).mean;
+        let mean = |i| field.moments(radius * radius * bandwidth2_factor(i, alpha)).mean;
         (1..=n).map(mean).sum::<f64>() / n as f64
     };
     let all: f64 = fields.iter().map(expected).sum();
@@ -274,20 +274,21 @@ fn measurement_points_follow_the_talks_curves() {
             ..Settings::default()
         };
         let rendered = picture(&scene, 8, &settings);
-        let radius2 = (0..64).map(|index| f64::from(rendered.radius2(index, Kind::Indirect, 0))).sum::<f64>() / 64.0;
+        let bandwidth2 =
+            (0..64).map(|index| f64::from(rendered.bandwidth2(index, Kind::Indirect, 0))).sum::<f64>() / 64.0;
         let error = rendered.pixels.iter().map(|p| (p.mean(0).x - 1.0).powi(2)).sum::<f64>() / 64.0;
-        (radius2 / f64::from(radius * radius), error.sqrt())
+        (bandwidth2 / f64::from(radius * radius), error.sqrt())
     };
     let (mut last_radius2, mut last_error) = (1.0, f64::INFINITY);
     for n in [1, 8, 64, 512] {
-        let (radius2, error) = at(n);
+        let (bandwidth2, error) = at(n);
         // The first iteration keeps the share alpha of its photons and of its area. Later ones follow the memoryless
         // product.
-        let expected = alpha * radius2_factor(n, alpha);
-        println!("{n} iterations: squared radius {radius2:.4}, expected {expected:.4}, error {error:.4}");
-        assert!((radius2 / expected - 1.0).abs() < 0.05, "{n} iterations: {radius2}, {expected}");
-        assert!((radius2 / radius2_factor(n, alpha) - 1.0).abs() > 0.05, "the memoryless rule is not detected");
-        assert!(radius2 < last_radius2 && error < last_error);
-        (last_radius2, last_error) = (radius2, error);
+        let expected = alpha * bandwidth2_factor(n, alpha);
+        println!("{n} iterations: squared radius {bandwidth2:.4}, expected {expected:.4}, error {error:.4}");
+        assert!((bandwidth2 / expected - 1.0).abs() < 0.05, "{n} iterations: {bandwidth2}, {expected}");
+        assert!((bandwidth2 / bandwidth2_factor(n, alpha) - 1.0).abs() > 0.05, "the memoryless rule is not detected");
+        assert!(bandwidth2 < last_radius2 && error < last_error);
+        (last_radius2, last_error) = (bandwidth2, error);
     }
 }

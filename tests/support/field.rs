@@ -125,13 +125,13 @@ impl Field {
         power / f64::from(photons)
     }
 
-    /// Mean of the irradiance over the disc of squared radius `radius2` around (x, z): six directions on three circles,
+    /// Mean of the irradiance over the disc of squared radius `bandwidth2` around (x, z): six directions on three circles,
     /// exact to the sixth order in the radius.
-    fn disc(self, x: f64, z: f64, radius2: f64) -> f64 {
+    fn disc(self, x: f64, z: f64, bandwidth2: f64) -> f64 {
         // Gauss-Legendre quadrature in the squared radius.
         const NODES: [(f64, f64); 3] =
             [(0.112_701_665_379_258, 5.0 / 18.0), (0.5, 4.0 / 9.0), (0.887_298_334_620_742, 5.0 / 18.0)];
-        NODES.iter().map(|(s, weight)| weight * self.ring(x, z, (s * radius2).sqrt())).sum()
+        NODES.iter().map(|(s, weight)| weight * self.ring(x, z, (s * bandwidth2).sqrt())).sum()
     }
 
     fn ring(self, x: f64, z: f64, r: f64) -> f64 {
@@ -200,12 +200,12 @@ impl PixelField {
     }
 
     /// The moments at a squared bandwidth, for independent photons.
-    pub fn moments(&self, radius2: f64) -> Moments {
-        let s = radius2 / self.largest2;
+    pub fn moments(&self, bandwidth2: f64) -> Moments {
+        let s = bandwidth2 / self.largest2;
         let [a, b, c] = self.means;
         // The parabola through the three expectations.
         let mean = a + s * (4.0 * b - 3.0 * a - c) + s * s * 2.0 * (a + c - 2.0 * b);
-        let variance = mean * self.flux * RHO / PI / (PI * radius2) + self.spread;
+        let variance = mean * self.flux * RHO / PI / (PI * bandwidth2) + self.spread;
         Moments { mean, variance }
     }
 }

@@ -3,7 +3,7 @@
 //!
 //! Photons with a density q of squared contributions give one iteration the variance `q R / (pi r^2)`; a field with
 //! Laplacian D gives it the bias `r^2 k D / 2`. R and k are the kernel's roughness and second moment. Over N iterations
-//! whose squared radii fall as `i^(-1/3)`, the variance of the mean is 3/4 of the last iteration's over N, and the bias
+//! whose squared bandwidths fall as `i^(-1/3)`, the variance of the mean is 3/4 of the last iteration's over N, and the bias
 //! is 3/2 of the last iteration's. The sum of variance and squared bias is least at
 //!
 //! `r^6 = 2 q R / (3 pi N k^2 D^2)`.
@@ -17,7 +17,7 @@
 //! in any case.
 
 use super::CountingRule;
-use super::memoryless::radius2_factor;
+use super::memoryless::bandwidth2_factor;
 use crate::math::Frame;
 use crate::photon::{Kernel, kernel::laplacian};
 use crate::transport::FoundPhotons;
@@ -25,10 +25,10 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 use wide::{CmpLt, f32x8};
 
-/// Initial squared radius of the kernel that estimates the Laplacian, over the squared radius of the picture level (the
+/// Initial squared bandwidth of the kernel that estimates the Laplacian, over the squared bandwidth of the picture level (the
 /// bandwidth level that the picture shows).
 const PILOT_RATIO: f32 = 4.0;
-/// Smallest and largest squared radius, as multiples of the squared radius of the memoryless rule with alpha 2/3.
+/// Smallest and largest squared bandwidth, as multiples of the squared bandwidth of the memoryless rule with alpha 2/3.
 const BOUNDS: (f64, f64) = (1.0 / 64.0, 4.0);
 
 /// Smallest number of photons from which bandwidths are estimated.
@@ -45,13 +45,13 @@ pub struct Adaptive {
 /// determine all levels, which keep their ratio.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Bandwidth {
-    /// Squared gathering radius (m2).
-    pub radius2: f32,
-    /// Squared gathering radius before the first iteration (m2).
+    /// Squared bandwidth (m2).
+    pub squared: f32,
+    /// Squared bandwidth before the first iteration (m2).
     initial2: f32,
-    /// Squared radius of this level over that of the level that the picture shows.
+    /// Squared bandwidth of this level over that of the level that the picture shows.
     scale: f32,
-    /// Squared radius of the kernel that estimates the Laplacian (m2).
+    /// Squared bandwidth of the kernel that estimates the Laplacian (m2).
     pilot2: f32,
     /// Number of photons found within the bandwidth, over all iterations.
     photons: u32,
@@ -83,15 +83,15 @@ impl CountingRule for Adaptive {
 
     const BEYOND: bool = true;
 
-    fn initial(&self, radius2: f32, _: f32, above: i32) -> Bandwidth {
+    fn initial(&self, squared: f32, _: f32, above: i32) -> Bandwidth {
         let scale = 2f32.powi(above);
-        let pilot2 = PILOT_RATIO * radius2 / scale;
-        Bandwidth { radius2, initial2: radius2, scale, pilot2, photons: 0, shot: 0.0, laplacian: 0.0, noise: 0.0 }
+        let pilot2 = PILOT_RATIO * squared / scale;
+        Bandwidth { squared, initial2: squared, scale, pilot2, photons: 0, shot: 0.0, laplacian: 0.0, noise: 0.0 }
     }
 
     #[inline]
-    fn radius2(bandwidth: &Bandwidth) -> f32 {
-        bandwidth.radius2
+    fn squared(bandwidth: &Bandwidth) -> f32 {
+        bandwidth.squared
     }
 
     #[inline]
@@ -102,7 +102,7 @@ impl CountingRule for Adaptive {
     #[inline]
     fn count(&self, bandwidths: &[Bandwidth], _: &mut [()], tally: &mut Tally, _: &Frame, photons: &FoundPhotons) {
         let Some(bandwidth) = bandwidths.last() else { return };
-        let within = photons.distance2.cmp_lt(f32x8::splat(bandwidth.radius2));
+        let within = photons.distance2.cmp_lt(f32x8::splat(bandwidth.squared));
         tally.photons += within.move_mask().count_ones();
         tally.squares += f64::from((within & (photons.light * photons.light)).reduce_add());
         let s = photons.distance2 / bandwidth.pilot2;
@@ -117,26 +117,26 @@ impl CountingRule for Adaptive {
     fn update(&self, i: u64, bandwidths: &mut [Bandwidth], _: &mut [()], found: &mut Tally) {
         let Some(last) = bandwidths.last_mut() else { return };
         last.photons = last.photons.saturating_add(found.photons);
-        last.shot += found.squares / (PI * f64::from(last.radius2));
+        last.shot += found.squares / (PI * f64::from(last.squared));
         last.laplacian += found.laplacian;
         last.noise += found.noise;
         let picture2 = f64::from(last.initial2 / last.scale);
         let next = i + 1;
         last.pilot2 = (f64::from(PILOT_RATIO) * picture2 * (next as f64).powf(-0.2)) as f32;
         let n = i as f64;
-        let memoryless2 = picture2 * radius2_factor(next, 2.0 / 3.0);
+        let memoryless2 = picture2 * bandwidth2_factor(next, 2.0 / 3.0);
         let squared = (last.laplacian * last.laplacian - last.noise).max(0.0) / (n * n);
         let optimum = optimum2(self.kernel, last.shot / n, squared, n);
         let known = last.photons >= MIN_PHOTONS && !optimum.is_nan();
         let picture2 = if known { optimum } else { memoryless2 };
         let picture2 = picture2.clamp(BOUNDS.0 * memoryless2, BOUNDS.1 * memoryless2) as f32;
         for bandwidth in bandwidths {
-            bandwidth.radius2 = (picture2 * bandwidth.scale).max(f32::MIN_POSITIVE);
+            bandwidth.squared = (picture2 * bandwidth.scale).max(f32::MIN_POSITIVE);
         }
     }
 }
 
-/// Squared radius of least error after `n` iterations; `shot` is the density q of squared contributions, `squared` the
+/// Squared bandwidth of least error after `n` iterations; `shot` is the density q of squared contributions, `squared` the
 /// squared Laplacian D^2. NaN if nothing is known.
 fn optimum2(kernel: Kernel, shot: f64, squared: f64, n: f64) -> f64 {
     let bias2 = f64::from(kernel.second_moment()).powi(2) * squared;
@@ -150,15 +150,15 @@ mod tests {
     use crate::photon::ThinningKey;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// The closed form against a search over constants c of radii `c i^(-1/6)`.
+    /// The closed form against a search over constants c of bandwidths `c i^(-1/6)`.
     #[test]
     fn the_optimum_has_the_least_error() {
         for kernel in [Kernel::Box, Kernel::Epanechnikov] {
             let (q, d, n) = (3.0, 20.0, 4096.0);
             let error = |last2: f64| {
-                let radii = (1..=n as u64).map(|i| last2 * (n / i as f64).cbrt());
+                let bandwidths = (1..=n as u64).map(|i| last2 * (n / i as f64).cbrt());
                 let (mut variance, mut bias) = (0.0, 0.0);
-                for r2 in radii {
+                for r2 in bandwidths {
                     variance += q * f64::from(kernel.roughness()) / (PI * r2) / (n * n);
                     bias += 0.5 * f64::from(kernel.second_moment()) * d * r2 / n;
                 }
@@ -189,16 +189,16 @@ mod tests {
                     }
                 }
                 rule.update(i, std::slice::from_mut(&mut bandwidth), &mut [], &mut tally);
-                assert!(bandwidth.radius2 > 0.0 && bandwidth.radius2.is_finite());
+                assert!(bandwidth.squared > 0.0 && bandwidth.squared.is_finite());
             }
             bandwidth
         };
         let (flat, curved) = (run(0.0), run(80.0));
-        let memoryless = 0.01 * radius2_factor(401, 2.0 / 3.0);
+        let memoryless = 0.01 * bandwidth2_factor(401, 2.0 / 3.0);
         println!("flat {flat:?}, curved {curved:?}, memoryless {memoryless}");
         assert!((flat.shot / 400.0 / 30_000.0 - 1.0).abs() < 0.05);
         assert!((curved.laplacian / 400.0 / 2.4e6 - 1.0).abs() < 0.15, "{}", curved.laplacian / 400.0);
         assert!(flat.laplacian.abs() < 0.15 * curved.laplacian);
-        assert!(f64::from(flat.radius2) > 1.2 * memoryless && flat.radius2 > 1.5 * curved.radius2);
+        assert!(f64::from(flat.squared) > 1.2 * memoryless && flat.squared > 1.5 * curved.squared);
     }
 }

@@ -19,7 +19,7 @@ pub struct ChiSquaredSettings {
     pub annuli: usize,
     /// Number of sectors per annulus, n_s; at least 1.
     pub sectors: usize,
-    /// Factor of the squared radius, k, in a reduction where no smaller disc looks uniform.
+    /// Factor of the squared bandwidth, k, in a reduction where no smaller disc looks uniform.
     pub k: f64,
     /// Factor by which the smallest number of photons for a test grows with every reduction, beta.
     pub beta: f64,
@@ -43,7 +43,7 @@ pub const MIN_BOUND: f32 = 10.0;
 /// Largest number of photons in all cells of a bandwidth level together; see [`ChiSquared::sums`].
 const MAX_COUNT: f64 = (1u32 << 30) as f64;
 
-/// The chi-squared bandwidth rule: a radius shrinks when the photons in the cells of its disc do not look uniform.
+/// The chi-squared bandwidth rule: a bandwidth shrinks when the photons in the cells of its disc do not look uniform.
 #[derive(Clone, Debug)]
 pub struct ChiSquared {
     annuli: usize,
@@ -53,7 +53,7 @@ pub struct ChiSquared {
     /// Quantile of the chi-squared distribution for the cells of the `j + 1` innermost annuli, at index `j`; infinite
     /// for a single cell.
     critical: Vec<f64>,
-    /// Borders between annuli: squared radii over that of the whole disc.
+    /// Borders between annuli: squared bandwidths over that of the whole disc.
     rings: Vec<f32>,
     /// Unit directions of the borders between sectors, as components along the two axes of the disc. If their number is
     /// even, only the borders in one half of the disc.
@@ -127,8 +127,8 @@ impl Tally {
 /// Bandwidth of one level of one pixel, with the state of its test.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bandwidth {
-    /// Squared gathering radius (m2).
-    pub radius2: f32,
+    /// Squared bandwidth (m2).
+    pub squared: f32,
     /// Number of photons required before the next test, B.
     pub bound: f32,
 }
@@ -193,11 +193,11 @@ impl ChiSquared {
             // A photon on a border belongs to the outer annulus.
             let mut cell = sectors;
             for ring in &self.rings {
-                let outside = photons.distance2.cmp_ge(f32x8::splat(bandwidth.radius2 * ring));
+                let outside = photons.distance2.cmp_ge(f32x8::splat(bandwidth.squared * ring));
                 cell += outside & f32x8::splat(self.sectors as f32);
             }
             let cell = cell.fast_trunc_int().to_array();
-            let mut within = photons.distance2.cmp_lt(f32x8::splat(bandwidth.radius2)).move_mask();
+            let mut within = photons.distance2.cmp_lt(f32x8::splat(bandwidth.squared)).move_mask();
             tally.counted[level] |= within != 0;
             while within != 0 {
                 counts[cell[within.trailing_zeros() as usize] as usize] += 1;
@@ -222,8 +222,8 @@ impl ChiSquared {
         let [half, sixth, outer] = [3.0, 1.0, 6.0].map(|cells| by(cells * BITS as f32));
         let sector = (v.cmp_lt(by(0.0)) & half) + (v.cmp_gt(u) & sixth) + ((u + v).cmp_lt(by(0.0)) & sixth);
         for (bandwidth, packed) in bandwidths.iter().zip(&mut tally.packed) {
-            let outside = photons.distance2.cmp_ge(by(bandwidth.radius2 * 0.5));
-            let within = photons.distance2.cmp_lt(by(bandwidth.radius2));
+            let outside = photons.distance2.cmp_ge(by(bandwidth.squared * 0.5));
+            let within = photons.distance2.cmp_lt(by(bandwidth.squared));
             let place = within.blend(sector + (outside & outer), by((DEFAULT_CELLS as u32 * BITS) as f32));
             let places = place.fast_trunc_int().to_array();
             let ones = |first: usize| u64x4::from(std::array::from_fn(|k| 1 << places[first + k]));
@@ -309,8 +309,8 @@ impl ChiSquared {
             Some(annuli) => annuli as f32 / self.annuli as f32,
             None => self.k,
         };
-        // The radius must stay above zero.
-        bandwidth.radius2 = (bandwidth.radius2 * factor).max(f32::MIN_POSITIVE);
+        // The bandwidth must stay above zero.
+        bandwidth.squared = (bandwidth.squared * factor).max(f32::MIN_POSITIVE);
         bandwidth.bound *= self.beta;
         counts.fill(0);
     }
@@ -332,13 +332,13 @@ impl CountingRule for ChiSquared {
         self.annuli * self.sectors
     }
 
-    fn initial(&self, radius2: f32, photons: f32, _: i32) -> Bandwidth {
-        Bandwidth { radius2, bound: photons.max(MIN_BOUND) }
+    fn initial(&self, squared: f32, photons: f32, _: i32) -> Bandwidth {
+        Bandwidth { squared, bound: photons.max(MIN_BOUND) }
     }
 
     #[inline]
-    fn radius2(bandwidth: &Bandwidth) -> f32 {
-        bandwidth.radius2
+    fn squared(bandwidth: &Bandwidth) -> f32 {
+        bandwidth.squared
     }
 
     #[inline(always)]
@@ -390,7 +390,7 @@ mod tests {
     fn count(rule: &ChiSquared, counts: &mut [u32], (x, y): (f32, f32)) {
         let frame = Frame::from_normal(Vec3::Z);
         let offset = frame.t * x + frame.b * y;
-        let bandwidth = Bandwidth { radius2: 1.0, bound: 10.0 };
+        let bandwidth = Bandwidth { squared: 1.0, bound: 10.0 };
         let mut tally = Tally::default();
         rule.count(
             &[bandwidth],
@@ -406,11 +406,11 @@ mod tests {
     #[test]
     fn counts_never_exceed_signed_integers() {
         let rule = rule();
-        let mut bandwidth = Bandwidth { radius2: 1.0, bound: 10.0 };
+        let mut bandwidth = Bandwidth { squared: 1.0, bound: 10.0 };
         let each = (1u32 << 30) / 12 + 1;
         let mut counts = [each; 12];
         assert!(!rule.test(&mut bandwidth, &mut counts));
-        assert_eq!((counts, bandwidth.radius2), ([each / 2; 12], 1.0));
+        assert_eq!((counts, bandwidth.squared), ([each / 2; 12], 1.0));
         // Many iterations later counts are still below the limit.
         for _ in 0..10_000 {
             counts.iter_mut().for_each(|count| *count += 1_000_000);
@@ -418,7 +418,7 @@ mod tests {
             assert!(counts.iter().all(|count| *count < 1 << 30));
         }
         counts[3] += 1_000_000;
-        assert!(rule.test(&mut bandwidth, &mut counts) && bandwidth.radius2 < 1.0);
+        assert!(rule.test(&mut bandwidth, &mut counts) && bandwidth.squared < 1.0);
         assert_eq!(counts, [0; 12]);
     }
 
@@ -478,7 +478,7 @@ mod tests {
                 let counted = alone.unpack(0, counts);
                 assert_eq!(counted, tally.unpack(level, &mut together[12 * level..][..12]));
                 assert_eq!(counted, tally_any.unpack(level, &mut any[12 * level..][..12]));
-                assert_eq!(counted, times > 0 && distance2.iter().any(|d2| *d2 < levels[level].radius2));
+                assert_eq!(counted, times > 0 && distance2.iter().any(|d2| *d2 < levels[level].squared));
             }
             assert_eq!((together, apart), (any, any));
         }
@@ -541,7 +541,7 @@ mod tests {
     #[test]
     fn bandwidths_stay_positive_and_never_grow_and_reductions_reset_counts() {
         let rule = rule();
-        let mut bandwidth = Bandwidth { radius2: 1.0, bound: 10.0 };
+        let mut bandwidth = Bandwidth { squared: 1.0, bound: 10.0 };
         let mut counts = [0u32; 12];
         let mut reductions = 0;
         for step in 0..2000u64 {
@@ -554,7 +554,7 @@ mod tests {
             }
             assert!(counts.iter().zip(&counted).all(|(now, then)| now >= then));
             let reduced = rule.test(&mut bandwidth, &mut counts);
-            assert!(bandwidth.radius2 > 0.0 && bandwidth.radius2 <= before.radius2);
+            assert!(bandwidth.squared > 0.0 && bandwidth.squared <= before.squared);
             assert_eq!(reduced, bandwidth.bound > before.bound);
             assert!(!reduced || counts.iter().all(|&c| c == 0));
             reductions += usize::from(reduced);
@@ -567,9 +567,9 @@ mod tests {
     fn reductions_follow_the_paper() {
         let rule = rule();
         let shrink = |counts: [u32; 12]| {
-            let (mut bandwidth, mut counts) = (Bandwidth { radius2: 1.0, bound: 10.0 }, counts);
+            let (mut bandwidth, mut counts) = (Bandwidth { squared: 1.0, bound: 10.0 }, counts);
             assert!(rule.test(&mut bandwidth, &mut counts));
-            (bandwidth.radius2, bandwidth.bound)
+            (bandwidth.squared, bandwidth.bound)
         };
         // Uniform inside, empty outside.
         assert_eq!(shrink([9, 10, 11, 10, 9, 11, 0, 0, 0, 0, 0, 0]), (0.5, 12.0));
@@ -579,7 +579,7 @@ mod tests {
         assert_eq!(shrink([0, 0, 0, 0, 0, 0, 9, 10, 11, 10, 9, 11]), (0.8, 12.0));
         // Too few photons for a test.
         let (mut bandwidth, mut counts) =
-            (Bandwidth { radius2: 1.0, bound: 10.0 }, [9u32, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+            (Bandwidth { squared: 1.0, bound: 10.0 }, [9u32, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
         assert!(!rule.test(&mut bandwidth, &mut counts));
     }
 }

@@ -4,7 +4,7 @@
 //! With N photons so far, M new ones and flux tau, all are scaled with the area: `N' = N + alpha M`, `R'^2 / R^2 = N' /
 //! (N + M)`, `tau' = (tau + tau_M) R'^2 / R^2` (the course's first talk; its slide omits `tau_M`). The estimate `tau /
 //! (pi R^2)` over the number of iterations is therefore the mean over iterations of `tau_M / (pi R^2)`, each with its
-//! own radius: `tau' / R'^2 = tau / R^2 + tau_M / R^2`. So flux needs no state, and its variance is known.
+//! own bandwidth: `tau' / R'^2 = tau / R^2 + tau_M / R^2`. So flux needs no state, and its variance is known.
 
 use super::CountingRule;
 use crate::math::Frame;
@@ -12,20 +12,20 @@ use crate::transport::{FoundPhotons, MAX_LEVELS};
 use serde::{Deserialize, Serialize};
 use wide::{CmpLt, f32x8};
 
-/// The bandwidth rule of progressive photon mapping: each radius shrinks by the number of photons found locally.
+/// The bandwidth rule of progressive photon mapping: each bandwidth shrinks by the number of photons found locally.
 #[derive(Clone, Copy, Debug)]
 pub struct LocalStatistics {
     /// Fraction of the new photons of each iteration that is kept, in (0, 1]; the rest is removed by shrinking the
-    /// radius.
+    /// bandwidth.
     pub alpha: f64,
 }
 
 /// Bandwidth of one level of one pixel, with its photon count.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bandwidth {
-    /// Squared gathering radius (m2). In f32, the factor of the millionth iteration would be off by a tenth of its
+    /// Squared bandwidth (m2). In f32, the factor of the millionth iteration would be off by a tenth of its
     /// difference to one.
-    pub radius2: f64,
+    pub squared: f64,
     /// Accumulated number of photons, N. Fractional, because only a fraction of each iteration's photons is kept.
     pub photons: f64,
 }
@@ -35,13 +35,13 @@ impl CountingRule for LocalStatistics {
     type Count = ();
     type Tally = [u32; MAX_LEVELS];
 
-    fn initial(&self, radius2: f32, _: f32, _: i32) -> Bandwidth {
-        Bandwidth { radius2: f64::from(radius2), photons: 0.0 }
+    fn initial(&self, squared: f32, _: f32, _: i32) -> Bandwidth {
+        Bandwidth { squared: f64::from(squared), photons: 0.0 }
     }
 
     #[inline]
-    fn radius2(bandwidth: &Bandwidth) -> f32 {
-        bandwidth.radius2 as f32
+    fn squared(bandwidth: &Bandwidth) -> f32 {
+        bandwidth.squared as f32
     }
 
     #[inline]
@@ -55,7 +55,7 @@ impl CountingRule for LocalStatistics {
     ) {
         for (bandwidth, photons_within) in bandwidths.iter().zip(tally) {
             *photons_within +=
-                photons.distance2.cmp_lt(f32x8::splat(bandwidth.radius2 as f32)).move_mask().count_ones();
+                photons.distance2.cmp_lt(f32x8::splat(bandwidth.squared as f32)).move_mask().count_ones();
         }
     }
 
@@ -64,7 +64,7 @@ impl CountingRule for LocalStatistics {
             if new > 0.0 {
                 let kept = bandwidth.photons + self.alpha * new;
                 let factor = kept / (bandwidth.photons + new);
-                bandwidth.radius2 = (bandwidth.radius2 * factor).max(f64::from(f32::MIN_POSITIVE));
+                bandwidth.squared = (bandwidth.squared * factor).max(f64::from(f32::MIN_POSITIVE));
                 bandwidth.photons = kept;
             }
         }
@@ -76,31 +76,31 @@ mod tests {
     use super::*;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// The papers' recursion against the mean over iterations. Counts never fall, radii never grow and stay positive,
+    /// The papers' recursion against the mean over iterations. Counts never fall, bandwidths never grow and stay positive,
     /// and flux is scaled with the area.
     #[test]
     fn the_papers_recursion_is_a_mean_over_iterations() {
         let rule = LocalStatistics { alpha: 2.0 / 3.0 };
         let mut ours = rule.initial(1.0, 10.0, 0);
-        let (mut n, mut radius2, mut tau) = (0.0, 1.0f64, 0.0);
+        let (mut n, mut squared, mut tau) = (0.0, 1.0f64, 0.0);
         let mut sum = 0.0;
         for i in 1..=3000u64 {
             let u = Stream::new(3, i, Domain::Test, 0).vertex(0).two(Purpose::Pixel);
-            let new = (u.x * 20.0 * radius2 as f32) as u32;
+            let new = (u.x * 20.0 * squared as f32) as u32;
             let flux = f64::from(new) * f64::from(u.y);
-            sum += flux / radius2;
+            sum += flux / squared;
             if new > 0 {
                 let kept = n + 2.0 / 3.0 * f64::from(new);
                 let factor = kept / (n + f64::from(new));
-                (n, radius2, tau) = (kept, radius2 * factor, (tau + flux) * factor);
+                (n, squared, tau) = (kept, squared * factor, (tau + flux) * factor);
             }
             let before = ours;
             rule.update(i, std::slice::from_mut(&mut ours), &mut [], &mut [new, 0, 0, 0, 0]);
-            assert!(ours.radius2 > 0.0 && ours.radius2 <= before.radius2 && ours.photons >= before.photons);
-            assert!((ours.radius2 / radius2 - 1.0).abs() < 1e-12 && (ours.photons - n).abs() < 1e-9 * n);
-            assert!((tau / radius2 - sum).abs() < 1e-9 * sum, "iteration {i}");
+            assert!(ours.squared > 0.0 && ours.squared <= before.squared && ours.photons >= before.photons);
+            assert!((ours.squared / squared - 1.0).abs() < 1e-12 && (ours.photons - n).abs() < 1e-9 * n);
+            assert!((tau / squared - sum).abs() < 1e-9 * sum, "iteration {i}");
         }
-        assert!(radius2 < 0.1);
+        assert!(squared < 0.1);
     }
 
     /// Under uniform light the number of photons is proportional to the area. The product of the factors is that of the
@@ -112,10 +112,10 @@ mod tests {
         let mut bandwidth = rule.initial(1.0, 10.0, 0);
         for i in 1..=1000 {
             // Enough photons that rounding to integers is negligible.
-            let new = (1e8 * bandwidth.radius2).round() as u32;
+            let new = (1e8 * bandwidth.squared).round() as u32;
             rule.update(i, std::slice::from_mut(&mut bandwidth), &mut [], &mut [new, 0, 0, 0, 0]);
-            let expected = 0.7 * super::super::memoryless::radius2_factor(i, 0.7);
-            assert!((bandwidth.radius2 / expected - 1.0).abs() < 1e-4, "iteration {i}");
+            let expected = 0.7 * super::super::memoryless::bandwidth2_factor(i, 0.7);
+            assert!((bandwidth.squared / expected - 1.0).abs() < 1e-4, "iteration {i}");
         }
     }
 }

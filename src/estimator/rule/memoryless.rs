@@ -1,4 +1,4 @@
-//! The memoryless rule \[Knaus and Zwicker 2011\]: radii depend on the iteration's number only, so iterations may run
+//! The memoryless rule \[Knaus and Zwicker 2011\]: bandwidths depend on the iteration's number only, so iterations may run
 //! in any order.
 //!
 //! `r_{i+1}^2 / r_i^2 = (i + alpha) / (i + 1)` \[post-reconstruction 2021, (4)\].
@@ -7,9 +7,9 @@
 /// 2013\].
 pub const ALPHA: f64 = 2.0 / 3.0;
 
-/// Squared radius of iteration `i` (from 1) over the initial one: `prod_{k=1}^{i-1} (k + alpha) / (k + 1)` = `Gamma(i +
+/// Squared bandwidth of iteration `i` (from 1) over the initial one: `prod_{k=1}^{i-1} (k + alpha) / (k + 1)` = `Gamma(i +
 /// alpha) / (Gamma(1 + alpha) Gamma(i + 1))`, in explicit form to avoid drift. `alpha` is in (0, 1].
-pub fn radius2_factor(i: u64, alpha: f64) -> f64 {
+pub fn bandwidth2_factor(i: u64, alpha: f64) -> f64 {
     debug_assert!(i >= 1 && alpha > 0.0 && alpha <= 1.0);
     const EXACT: u64 = 32;
     let product = |to: u64| (1..to).map(|k| (k as f64 + alpha) / (k as f64 + 1.0)).product::<f64>();
@@ -42,7 +42,7 @@ mod tests {
             let mut by_recursion = 1.0f64;
             for i in 1..=1_000_000u64 {
                 if i.is_power_of_two() || i % 99_991 == 0 {
-                    let explicit = radius2_factor(i, alpha);
+                    let explicit = bandwidth2_factor(i, alpha);
                     let error = explicit / by_recursion - 1.0;
                     assert!(error.abs() < 1e-9, "alpha {alpha}, iteration {i}: {error}");
                 }
@@ -56,11 +56,11 @@ mod tests {
     fn bandwidths_stay_positive_and_never_grow() {
         let mut last = f64::INFINITY;
         for i in 1..5000 {
-            let factor = radius2_factor(i, ALPHA);
+            let factor = bandwidth2_factor(i, ALPHA);
             assert!(factor > 0.0 && factor < last);
             last = factor;
         }
-        assert_eq!(radius2_factor(1, ALPHA), 1.0);
-        assert_eq!(radius2_factor(100, 1.0), 1.0);
+        assert_eq!(bandwidth2_factor(1, ALPHA), 1.0);
+        assert_eq!(bandwidth2_factor(100, 1.0), 1.0);
     }
 }

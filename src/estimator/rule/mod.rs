@@ -15,7 +15,7 @@ use serde::de::DeserializeOwned;
 /// A rule that shrinks the bandwidths of a pixel by the photons counted around its gathering points. It has one
 /// bandwidth per level of a pixel; the levels of a camera path are counted and updated together.
 pub trait CountingRule: Clone + Sync {
-    /// State of one bandwidth level of one pixel: its squared radius and the statistics that determine it.
+    /// State of one bandwidth level of one pixel: its squared bandwidth and the statistics that determine it.
     type Bandwidth: Copy + Send + Sync + Serialize + DeserializeOwned;
     /// A photon count in the state of a bandwidth level, for example in one cell of its disc.
     type Count: Copy + Default + Send + Sync + Serialize + DeserializeOwned;
@@ -32,14 +32,14 @@ pub trait CountingRule: Clone + Sync {
     fn counts(&self) -> usize {
         1
     }
-    /// The bandwidth of a level before the first iteration: `radius2` is the squared radius, `photons` the number of
+    /// The bandwidth of a level before the first iteration: `squared` is its square, `photons` the number of
     /// photons of the pilot iteration within it (0 if unknown), `above` by how many levels it is larger than the level
     /// that the picture shows (negative if smaller).
-    fn initial(&self, radius2: f32, photons: f32, above: i32) -> Self::Bandwidth;
-    /// Squared gathering radius of a bandwidth (m2).
-    fn radius2(bandwidth: &Self::Bandwidth) -> f32;
-    /// Squared radius within which photons are counted, if [`CountingRule::BEYOND`]; `largest2` is the largest squared
-    /// gathering radius.
+    fn initial(&self, squared: f32, photons: f32, above: i32) -> Self::Bandwidth;
+    /// Squared bandwidth of a bandwidth (m2).
+    fn squared(bandwidth: &Self::Bandwidth) -> f32;
+    /// Squared bandwidth within which photons are counted, if [`CountingRule::BEYOND`]; `largest2` is the largest squared
+    /// bandwidth.
     #[inline]
     fn reach2(&self, bandwidths: &[Self::Bandwidth], largest2: f32) -> f32 {
         let _ = bandwidths;

@@ -54,13 +54,13 @@ impl CountingRule for Thinned {
         self.0.counts() + 1
     }
 
-    fn initial(&self, radius2: f32, photons: f32, above: i32) -> Bandwidth {
-        self.0.initial(radius2, photons, above)
+    fn initial(&self, squared: f32, photons: f32, above: i32) -> Bandwidth {
+        self.0.initial(squared, photons, above)
     }
 
     #[inline]
-    fn radius2(bandwidth: &Bandwidth) -> f32 {
-        ChiSquared::radius2(bandwidth)
+    fn squared(bandwidth: &Bandwidth) -> f32 {
+        ChiSquared::squared(bandwidth)
     }
 
     #[inline]
@@ -76,12 +76,12 @@ impl CountingRule for Thinned {
         let levels = bandwidths.iter().zip(counts.chunks_exact_mut(self.counts())).zip(tally);
         for ((bandwidth, counts), tally) in levels {
             let Some((heaviest, counts)) = counts.split_last_mut() else { continue };
-            let within = |k: usize| distance2[k] < bandwidth.radius2;
+            let within = |k: usize| distance2[k] < bandwidth.squared;
             let weight = |k: usize| if within(k) { thinning_key::weight(photons.thinning_keys[k]) } else { 0 };
             let found = (0..8).map(weight).fold(0, u32::max);
             if found > *heaviest {
                 tally.settle(counts);
-                let seed = u64::from(bandwidth.radius2.to_bits()) << 32 | u64::from(found);
+                let seed = u64::from(bandwidth.squared.to_bits()) << 32 | u64::from(found);
                 thin(counts, f64::from(thinning_key::bound(*heaviest) / thinning_key::bound(found)), seed);
                 *heaviest = found;
             }
@@ -98,9 +98,9 @@ impl CountingRule for Thinned {
         let levels = bandwidths.iter_mut().zip(counts.chunks_exact_mut(self.counts())).zip(tally);
         for ((bandwidth, counts), tally) in levels {
             let Some((heaviest, counts)) = counts.split_last_mut() else { continue };
-            let before = bandwidth.radius2;
+            let before = bandwidth.squared;
             self.0.update(i, std::slice::from_mut(bandwidth), counts, tally);
-            if bandwidth.radius2 < before {
+            if bandwidth.squared < before {
                 // Counts start again at zero, and so does the largest weight.
                 *heaviest = 0;
             }
@@ -150,8 +150,8 @@ mod tests {
             // A single test, so that the probability of a rejection is the significance.
             thinned.update(1, &mut a, &mut counts_a, &mut tally_a);
             plain.update(1, &mut b, &mut counts_b, &mut tally_b);
-            shrunk[0] += f64::from(u8::from(a[0].radius2 < 1.0)) / TRIALS as f64;
-            shrunk[1] += f64::from(u8::from(b[0].radius2 < 1.0)) / TRIALS as f64;
+            shrunk[0] += f64::from(u8::from(a[0].squared < 1.0)) / TRIALS as f64;
+            shrunk[1] += f64::from(u8::from(b[0].squared < 1.0)) / TRIALS as f64;
         }
         shrunk
     }

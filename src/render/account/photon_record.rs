@@ -91,7 +91,7 @@ impl PhotonRecord {
         let kernels = Kernels::new(state.pixels);
         let squared_error = |kind: Kind| {
             let light = self.light_per_sample(state, kind, flux_per_path);
-            2.0 * (kernels.mean_share(|index| state.radius2(index, kind)) * light / mean).powi(2)
+            2.0 * (kernels.mean_share(|index| state.bandwidth2(index, kind)) * light / mean).powi(2)
         };
         let errors: Vec<(Kind, f64)> = kinds.into_iter().map(|kind| (kind, squared_error(kind))).collect();
         let sum: f64 = errors.iter().map(|(_, squared)| squared).sum();
@@ -113,7 +113,7 @@ impl PhotonRecord {
         }
         let predict = |index: usize| {
             let albedo = state.pixels[index].albedo().element_sum() / 3.0;
-            let area = PI * f64::from(state.radius2(index, kind));
+            let area = PI * f64::from(state.bandwidth2(index, kind));
             if area > 0.0 { flux_per_path * albedo / (PI * area) } else { 0.0 }
         };
         (0..state.pixels.len()).map(predict).sum::<f64>() / state.pixels.len() as f64
@@ -171,13 +171,13 @@ impl Kernels {
     }
 
     /// Share of the picture's pixels that lie within the kernel of one pixel and so gather the same photons: the mean
-    /// over [`KERNEL_SAMPLES`] pixels. `radius2` is the squared kernel radius of a pixel.
-    fn mean_share(&self, radius2: impl Fn(usize) -> f32 + Sync) -> f64 {
+    /// over [`KERNEL_SAMPLES`] pixels. `bandwidth2` is the squared kernel bandwidth of a pixel.
+    fn mean_share(&self, bandwidth2: impl Fn(usize) -> f32 + Sync) -> f64 {
         let step = self.hits.len().div_ceil(KERNEL_SAMPLES).max(1);
-        let sampled: Vec<(Vec3, f32)> = self.hits.iter().step_by(step).map(|&(i, p)| (p, radius2(i))).collect();
+        let sampled: Vec<(Vec3, f32)> = self.hits.iter().step_by(step).map(|&(i, p)| (p, bandwidth2(i))).collect();
         // A pixel is in its own kernel, also where that has no size.
-        let within = |&(p, radius2): &(Vec3, f32)| {
-            let inside = self.hits.iter().filter(|(_, other)| p.distance_squared(*other) < radius2);
+        let within = |&(p, bandwidth2): &(Vec3, f32)| {
+            let inside = self.hits.iter().filter(|(_, other)| p.distance_squared(*other) < bandwidth2);
             inside.count().max(1)
         };
         let pairs: Vec<usize> = sampled.par_iter().map(within).collect();

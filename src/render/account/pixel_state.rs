@@ -31,8 +31,8 @@ impl<'a> PixelState<'a> {
 
     /// Squared bandwidth of photons of `kind` at the pixel `index`, in the picture's level (square scene units). With
     /// [`Indirect::Paths`] only caustic photons have one.
-    pub fn radius2(&self, index: usize, kind: Kind) -> f32 {
+    pub fn bandwidth2(&self, index: usize, kind: Kind) -> f32 {
         let kind = if self.settings.indirect == Indirect::Paths { Kind::Caustic } else { kind };
-        self.bandwidths.radius2(index, &self.pixels[index], kind, self.settings.levels.picture_level())
+        self.bandwidths.bandwidth2(index, &self.pixels[index], kind, self.settings.levels.picture_level())
     }
 }

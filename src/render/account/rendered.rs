@@ -53,8 +53,8 @@ impl Rendered {
 
     /// Squared bandwidth of photons of `kind` in the last iteration at the pixel `index` (square scene units); level 0
     /// is the smallest.
-    pub fn radius2(&self, index: usize, kind: Kind, level: usize) -> f32 {
-        self.bandwidths.radius2(index, &self.pixels[index], kind, level)
+    pub fn bandwidth2(&self, index: usize, kind: Kind, level: usize) -> f32 {
+        self.bandwidths.bandwidth2(index, &self.pixels[index], kind, level)
     }
 
     /// Number of samples of pixels that were rejected because they were not finite.

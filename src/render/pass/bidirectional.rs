@@ -74,7 +74,7 @@ pub struct Passes {
     /// Number of pixels that the largest initial bandwidth covers, and expected number of photons within it if one light
     /// path starts per pixel.
     covered: f32,
-    /// Initial radii of the largest bandwidth level of all pixels (scene units), apart from the accumulators: every
+    /// Initial bandwidths of the largest bandwidth level of all pixels (scene units), apart from the accumulators: every
     /// iteration reads them before its camera paths, and the accumulators, a kilobyte each, would miss the cache.
     initial: Vec<f32>,
 }
@@ -259,7 +259,7 @@ struct Iteration<'i, 'a> {
     covered: f32,
     /// Light paths per pixel.
     light_paths: f32,
-    /// Initial radii of the largest bandwidth level of all pixels (scene units); empty without merging.
+    /// Initial bandwidths of the largest bandwidth level of all pixels (scene units); empty without merging.
     initial: &'i [f32],
 }
 
@@ -314,24 +314,24 @@ impl<'a> LightTracer<'_, 'a> {
 }
 
 impl Iteration<'_, '_> {
-    /// Merging radii of a pixel at the bandwidth levels that a pair of paths samples.
+    /// Merging bandwidths of a pixel at the bandwidth levels that a pair of paths samples.
     #[inline]
     fn levels(&self, pixel: u32, pair: &Pair) -> MergeLevels {
         let bandwidth = self.initial.get(pixel as usize).copied().unwrap_or_default();
         let Iteration { shared, schedule, .. } = self;
         MergeLevels::new((pair.levels.0..pair.levels.0 + pair.levels.1).map(|level| {
-            let radius2 = schedule.radius2(bandwidth, level);
+            let bandwidth2 = schedule.bandwidth2(bandwidth, level);
             let shrunk = schedule.factor2() * level_factor2(level, schedule.levels());
             let eta = match (self.map.is_some(), shared.techniques.connect) {
                 (false, _) => Eta::NONE,
                 (true, true) => {
                     let merges = shared.merged_paths * self.merging;
                     let pixels = self.covered * shrunk;
-                    Eta::new(radius2, merges).sharing(pixels * self.merging, pixels * self.light_paths)
+                    Eta::new(bandwidth2, merges).sharing(pixels * self.merging, pixels * self.light_paths)
                 }
                 (true, false) => Eta::MERGE_ONLY,
             };
-            (radius2, eta)
+            (bandwidth2, eta)
         }))
         .with_probability(self.merging)
     }
@@ -492,20 +492,20 @@ impl Integrator for Passes {
         }
         // Merging is one of many techniques, and small kernels suffice \[Georgiev et al. 2012\].
         let initial = match settings.initial_bandwidth {
-            InitialBandwidth::Fixed(radius) => InitialBandwidth::Fixed(radius),
+            InitialBandwidth::Fixed(bandwidth) => InitialBandwidth::Fixed(bandwidth),
             _ => InitialBandwidth::Footprint,
         };
         let Settings { max_initial_bandwidth: [widest, _], seed, .. } = *settings;
         let (none, camera_paths) = (PhotonMap::build(Vec::new()), input.camera_paths());
         let all = initial_bandwidths(&camera_paths, initial, widest, seed, [&none; 2]);
-        // A footprint covers the same number of pixels everywhere; a fixed radius is compared with the median
+        // A footprint covers the same number of pixels everywhere; a fixed bandwidth is compared with the median
         // footprint.
         let covered = match initial {
-            InitialBandwidth::Fixed(radius) => {
+            InitialBandwidth::Fixed(bandwidth) => {
                 let footprints =
                     initial_bandwidths(&camera_paths, InitialBandwidth::Footprint, f32::INFINITY, seed, [&none; 1]);
                 let mut footprints = footprints.into_flattened();
-                FOOTPRINT_PIXELS * radius / median(&mut footprints, f32::total_cmp).unwrap_or(f32::INFINITY)
+                FOOTPRINT_PIXELS * bandwidth / median(&mut footprints, f32::total_cmp).unwrap_or(f32::INFINITY)
             }
             _ => FOOTPRINT_PIXELS.min(widest * camera.whole_width()),
         };

@@ -89,7 +89,7 @@ impl Cost {
         let camera_paths =
             CameraPaths { indirect: Indirect::Photons, ..settings.camera_paths(scene, camera, &initial_media) };
         let reach = |length: f32| match settings.initial_bandwidth {
-            InitialBandwidth::Fixed(radius) => radius,
+            InitialBandwidth::Fixed(bandwidth) => bandwidth,
             _ => footprint(camera, length),
         };
         let counts = VertexCounts::new(&camera_paths, &initial_media, settings.seed, guide, reach);

@@ -250,9 +250,9 @@ fn add_errors(
     let mut light = Vec::with_capacity(2 * NEIGHBOURS);
     let mut sum = Rgb::ZERO;
     for (map, nearest) in maps.iter().zip(nearest) {
-        let radius2 = nearest.radius2(map, point.p, point.ng, NEIGHBOURS, cap * cap).unwrap_or(cap * cap);
-        let scale = probe.weight / (PI * radius2);
-        map.within(point.p, radius2, |guided, _| {
+        let bandwidth2 = nearest.bandwidth2(map, point.p, point.ng, NEIGHBOURS, cap * cap).unwrap_or(cap * cap);
+        let scale = probe.weight / (PI * bandwidth2);
+        map.within(point.p, bandwidth2, |guided, _| {
             let photon = &guided.photon;
             if photon.ng.dot(point.ng) > 0.0 {
                 let found = scale * photon.flux;

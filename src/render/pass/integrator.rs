@@ -36,7 +36,7 @@ pub(in crate::render) trait Integrator {
         pixels: &mut [PixelAccumulator],
         phases: &mut Phases,
     ) -> Option<Work>;
-    /// Squared radii of every pixel and level after the last iteration (square scene units), by kind of photons; `None` if
+    /// Squared bandwidths of every pixel and level after the last iteration (square scene units), by kind of photons; `None` if
     /// they follow from the number of the iteration.
     fn counted(&self) -> Option<ByKind<Vec<f32>>> {
         None

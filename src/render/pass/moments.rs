@@ -281,7 +281,7 @@ struct Walks<'w, 'a> {
     proxy: &'w Proxy<'a>,
     variants: [Bidirectional<'w>; 3],
     guide: Option<&'w Guide>,
-    radius2: Vec<f32>,
+    bandwidth2: Vec<f32>,
     covered: f64,
     /// Side of a block in pixels of the proxy.
     side: u32,
@@ -368,7 +368,7 @@ impl Proxy<'_> {
             proxy: self,
             variants,
             guide,
-            radius2: bandwidths.iter().map(|[bandwidth]| schedule.radius2(*bandwidth, level)).collect(),
+            bandwidth2: bandwidths.iter().map(|[bandwidth]| schedule.bandwidth2(*bandwidth, level)).collect(),
             covered,
             side,
             blocks,
@@ -383,7 +383,7 @@ impl Walks<'_, '_> {
     fn run(&self, iterations: u64, late: &dyn Fn() -> bool) -> Moments {
         let none = Block { sums: vec![Sums::default(); self.candidates.len()], ..Block::default() };
         let mut blocks = vec![none; self.blocks.pixels()];
-        let mut direct = vec![[Rgb::ZERO; 2]; self.radius2.len()];
+        let mut direct = vec![[Rgb::ZERO; 2]; self.bandwidth2.len()];
         let mut photons = Photons::default();
         let mut done = 0;
         // The first iteration leaves the photons for the second, and is not counted.
@@ -439,9 +439,9 @@ impl Walks<'_, '_> {
     }
 
     fn levels(&self, pixel: usize) -> MergeLevels {
-        let radius2 = self.radius2[pixel];
-        let eta = Eta::new(radius2, self.variants[0].merged_paths).sharing(self.covered as f32, self.covered as f32);
-        MergeLevels::new(std::iter::once((radius2, eta)))
+        let bandwidth2 = self.bandwidth2[pixel];
+        let eta = Eta::new(bandwidth2, self.variants[0].merged_paths).sharing(self.covered as f32, self.covered as f32);
+        MergeLevels::new(std::iter::once((bandwidth2, eta)))
     }
 
     /// Traces the light paths and camera paths of a row of blocks.
@@ -547,7 +547,7 @@ impl Walks<'_, '_> {
             return None;
         }
         let (densities, own) = (Densities::of(technique, ratios), ratios[0].own);
-        let eta = std::f64::consts::PI * f64::from(self.radius2[pixel] * self.variants[0].merged_paths);
+        let eta = std::f64::consts::PI * f64::from(self.bandwidth2[pixel] * self.variants[0].merged_paths);
         let group = match technique {
             Technique::Hit { .. } | Technique::NextEvent { .. } => Correlated::Camera,
             Technique::Connect { .. } => Correlated::Connections,

@@ -12,7 +12,7 @@ use crate::photon::{Kind, PhotonMap, kind};
 use crate::random::Domain;
 use crate::render::clock::{Phases, cpu_seconds};
 use crate::render::initial_bandwidth::{
-    InitialBandwidth, initial_bandwidths, initial_volume_bandwidths, median_radius2,
+    InitialBandwidth, initial_bandwidths, initial_volume_bandwidths, median_bandwidth2,
 };
 use crate::render::input::RenderInput;
 use crate::render::settings::Settings;
@@ -75,7 +75,7 @@ fn equal_flux(input: &RenderInput<'_>) -> Option<[Option<EqualFlux>; 3]> {
 /// Pixels before the first iteration, with their initial bandwidths, and a bound of bandwidths.
 pub(super) struct InitialPixels {
     pub pixels: Vec<PixelAccumulator>,
-    /// Largest squared radius after a camera path's first broad bounce, before the radii shrink.
+    /// Largest squared bandwidth after a camera path's first broad bounce, before the bandwidths shrink.
     pub indirect_cap2: f32,
 }
 
@@ -158,7 +158,7 @@ impl PhotonTracer {
         let maps = pilot.surface.map(PhotonMap::build);
         let bandwidths = initial_bandwidths(camera_paths, initial, surface, seed, maps.each_ref());
         let indirect_cap2 = match (initial, settings.indirect) {
-            (InitialBandwidth::Nearest(k), Indirect::Paths) => median_radius2(&maps[Kind::Caustic as usize], k),
+            (InitialBandwidth::Nearest(k), Indirect::Paths) => median_bandwidth2(&maps[Kind::Caustic as usize], k),
             _ => f32::INFINITY,
         };
         let mut pixels = settings.pixels(scene, &bandwidths);

@@ -10,7 +10,7 @@ use crate::photon::{ByKind, Kind, PhotonMap};
 use crate::processor::prefetch;
 use crate::render::initial_bandwidth::InitialBandwidth;
 use crate::render::settings::Settings;
-use crate::transport::{FoundPhotons, GatherBandwidths, LevelRadii, PhotonCounter};
+use crate::transport::{FoundPhotons, GatherBandwidths, LevelBandwidths, PhotonCounter};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
@@ -22,16 +22,16 @@ pub(super) trait PixelBandwidths: Clone {
     where
         Self: 'c;
 
-    /// Sets the bandwidths of all pixels before the first iteration. `indirect_cap2` is the largest squared radius
+    /// Sets the bandwidths of all pixels before the first iteration. `indirect_cap2` is the largest squared bandwidth
     /// after a camera path's first broad bounce.
     fn start(&mut self, pixels: &[PixelAccumulator], indirect_cap2: f32);
 
     /// The bandwidths of iteration `i`, divided into parallel tasks of `size` pixels.
     fn par_chunks(&mut self, i: u64, size: usize) -> impl IndexedParallelIterator<Item = Self::Chunk<'_>>;
 
-    /// Squared radii after the last iteration by kind of photons, of every pixel and level (square scene units); `None` if
+    /// Squared bandwidths after the last iteration by kind of photons, of every pixel and level (square scene units); `None` if
     /// they follow from the iteration's number.
-    fn radii2(&self) -> Option<ByKind<Vec<f32>>>;
+    fn bandwidths2(&self) -> Option<ByKind<Vec<f32>>>;
 
     /// The state of the bandwidths that the next iteration needs, serialized.
     ///
@@ -69,7 +69,7 @@ pub(super) trait PathBandwidths: GatherBandwidths {
 #[derive(Clone)]
 pub(super) struct Scheduled<'a> {
     settings: &'a Settings,
-    /// Initial radii of all pixels by kind of photons (scene units), apart from the accumulators: every iteration reads
+    /// Initial bandwidths of all pixels by kind of photons (scene units), apart from the accumulators: every iteration reads
     /// them before its camera paths, and the accumulators, a kilobyte each, would miss the cache.
     initial: Arc<[ByKind<f32>]>,
     indirect_cap2: f32,
@@ -98,7 +98,7 @@ impl PixelBandwidths for Scheduled<'_> {
         self.initial.par_chunks(size).map(move |initial| ScheduledChunk { initial, schedule, indirect_cap2 })
     }
 
-    fn radii2(&self) -> Option<ByKind<Vec<f32>>> {
+    fn bandwidths2(&self) -> Option<ByKind<Vec<f32>>> {
         None
     }
 
@@ -121,20 +121,20 @@ pub(super) struct ScheduledChunk<'c> {
 
 impl BandwidthChunk for ScheduledChunk<'_> {
     type Path<'p>
-        = ByKind<LevelRadii>
+        = ByKind<LevelBandwidths>
     where
         Self: 'p;
 
     #[inline(always)]
-    fn path(&mut self, at: usize, _: usize, levels: Range<usize>) -> ByKind<LevelRadii> {
+    fn path(&mut self, at: usize, _: usize, levels: Range<usize>) -> ByKind<LevelBandwidths> {
         self.initial[at].map(|bandwidth| {
-            let radii2 = levels.clone().map(|level| self.schedule.radius2(bandwidth, level));
-            LevelRadii::new(radii2).capped_after_broad_bounce(self.indirect_cap2)
+            let bandwidths2 = levels.clone().map(|level| self.schedule.bandwidth2(bandwidth, level));
+            LevelBandwidths::new(bandwidths2).capped_after_broad_bounce(self.indirect_cap2)
         })
     }
 }
 
-impl PathBandwidths for ByKind<LevelRadii> {}
+impl PathBandwidths for ByKind<LevelBandwidths> {}
 
 /// Arrangement in memory of the bandwidths of a pixel: by colour channel, then by kind of photons, then by level.
 #[derive(Clone, Copy)]
@@ -248,7 +248,7 @@ impl<R: CountingRule> PixelBandwidths for Counted<'_, R> {
         chunks.map(move |(bandwidths, counts)| CountedChunk { rule, i, layout, bandwidths, counts })
     }
 
-    fn radii2(&self) -> Option<ByKind<Vec<f32>>> {
+    fn bandwidths2(&self) -> Option<ByKind<Vec<f32>>> {
         // Of three channels the middle one.
         let channel = self.layout.channels / 2;
         let count = self.layout.channel_len();
@@ -256,7 +256,7 @@ impl<R: CountingRule> PixelBandwidths for Counted<'_, R> {
         let first = self.layout.kind_len(Kind::Indirect);
         let by_kind = [0..first, first..count].map(|of_kind| {
             let bandwidths = of_pixels.clone().flat_map(|all| &all[of_kind.clone()]);
-            bandwidths.map(R::radius2).collect()
+            bandwidths.map(R::squared).collect()
         });
         Some(by_kind)
     }
@@ -297,7 +297,7 @@ impl<R: CountingRule> BandwidthChunk for CountedChunk<'_, R> {
         // Counts of the first kind, which most pixels see. The last count may lie in a cache line of its own.
         let counts = &self.counts[first * self.layout.counts..][..self.layout.levels * self.layout.counts];
         prefetch(counts.iter().step_by(counts_per_line).chain(counts.last()).copied());
-        prefetch([R::radius2(&self.bandwidths[first])]);
+        prefetch([R::squared(&self.bandwidths[first])]);
     }
 
     #[inline(always)]
@@ -318,20 +318,20 @@ struct KindBandwidths<'a, R: CountingRule> {
 }
 
 impl<R: CountingRule> KindBandwidths<'_, R> {
-    /// The radii of the levels in ascending order. Levels shrink independently, so their order may change.
+    /// The bandwidths of the levels in ascending order. Levels shrink independently, so their order may change.
     #[inline(always)]
-    fn radii(&self) -> LevelRadii {
+    fn levels(&self) -> LevelBandwidths {
         if let [only] = &self.bandwidths {
-            return LevelRadii::new(std::iter::once(R::radius2(only)));
+            return LevelBandwidths::new(std::iter::once(R::squared(only)));
         }
-        if self.bandwidths.is_sorted_by_key(R::radius2) {
-            return LevelRadii::new(self.bandwidths.iter().map(R::radius2));
+        if self.bandwidths.is_sorted_by_key(R::squared) {
+            return LevelBandwidths::new(self.bandwidths.iter().map(R::squared));
         }
         let mut order = std::array::from_fn(|level| level as u8);
-        let radius2 = |level: u8| R::radius2(&self.bandwidths[usize::from(level)]);
+        let bandwidth2 = |level: u8| R::squared(&self.bandwidths[usize::from(level)]);
         let ascending = &mut order[..self.bandwidths.len()];
-        ascending.sort_by(|&a, &b| radius2(a).total_cmp(&radius2(b)));
-        LevelRadii::new(ascending.iter().map(|&level| radius2(level))).with_order(order)
+        ascending.sort_by(|&a, &b| bandwidth2(a).total_cmp(&bandwidth2(b)));
+        LevelBandwidths::new(ascending.iter().map(|&level| bandwidth2(level))).with_order(order)
     }
 }
 
@@ -366,8 +366,8 @@ impl<'a, R: CountingRule> GatherBandwidths for CountedPath<'a, R> {
     }
 
     #[inline(always)]
-    fn radii(&mut self, kind: Kind, _: &PhotonMap, _: Vec3, _: Vec3, _: f32) -> LevelRadii {
-        self.kinds[kind as usize].radii()
+    fn levels(&mut self, kind: Kind, _: &PhotonMap, _: Vec3, _: Vec3, _: f32) -> LevelBandwidths {
+        self.kinds[kind as usize].levels()
     }
 
     #[inline(always)]

@@ -20,12 +20,12 @@ use crate::math::Vec3;
 use crate::photon::{ByKind, Kernel, Kind, MAX_NEIGHBOURS, Nearest, Photon, PhotonMap, PhotonMaps, kind};
 use crate::random::{Domain, Streams};
 use crate::render::clock::{Phases, cpu_seconds};
-use crate::render::initial_bandwidth::{InitialBandwidth, MIN_RADIUS_RATIO, SCREEN_CAP, picture_width_at};
+use crate::render::initial_bandwidth::{InitialBandwidth, MIN_BANDWIDTH_RATIO, SCREEN_CAP, picture_width_at};
 use crate::render::input::RenderInput;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
 use crate::transport::{
-    GatherBandwidths, Indirect, InitialMedia, LevelRadii, LightPaths, Photons, Scratch, light_path,
+    GatherBandwidths, Indirect, InitialMedia, LevelBandwidths, LightPaths, Photons, Scratch, light_path,
 };
 use bumpalo::Bump;
 
@@ -91,12 +91,12 @@ impl GatherBandwidths for Neighbours<'_> {
 
     fn frame(_: Vec3) {}
 
-    fn radii(&mut self, kind: Kind, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii {
+    fn levels(&mut self, kind: Kind, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelBandwidths {
         let cap = (SCREEN_CAP * picture_width_at(self.camera, length)).max(self.least);
         let cap2 = cap * cap;
         let nearest = &mut self.nearest[kind as usize];
-        let radius2 = nearest.radius2(photons, p, ng, self.count, cap2).unwrap_or(cap2);
-        LevelRadii::new(std::iter::once(radius2.max(self.least * self.least)))
+        let bandwidth2 = nearest.bandwidth2(photons, p, ng, self.count, cap2).unwrap_or(cap2);
+        LevelBandwidths::new(std::iter::once(bandwidth2.max(self.least * self.least)))
     }
 
     fn counter(&mut self, _: Kind, (): &()) {}
@@ -163,7 +163,7 @@ impl Integrator for Pm {
             InitialBandwidth::Nearest(k) => k.clamp(2, MAX_NEIGHBOURS),
             _ => settings.method.default_neighbours(1),
         };
-        let least = MIN_RADIUS_RATIO * camera_paths.scene.lights.sky().radius;
+        let least = MIN_BANDWIDTH_RATIO * camera_paths.scene.lights.sky().radius;
         let streams = Streams::in_sequence(settings.seed, i, Domain::CameraIndependent);
         let scratch = <(Scratch, ByKind<Nearest>)>::default;
         par_pixels(

@@ -164,6 +164,6 @@ impl<B: PixelBandwidths> Integrator for Sppm<B> {
     }
 
     fn counted(&self) -> Option<ByKind<Vec<f32>>> {
-        self.bandwidths.radii2()
+        self.bandwidths.bandwidths2()
     }
 }

@@ -52,12 +52,12 @@ impl Maps {
         starts
     }
 
-    /// The photons in media, with the gathering radii of some bandwidth levels of `pixel`; `None` without scattering
+    /// The photons in media, with the bandwidths of some bandwidth levels of `pixel`; `None` without scattering
     /// media.
     #[inline]
     pub fn volume(&self, pixel: &PixelAccumulator, levels: impl Iterator<Item = usize>) -> Option<Volume<'_>> {
         let VolumeMap { map, schedule } = self.volume.as_ref()?;
-        Some(Volume::new(map, levels.map(|level| schedule.volume_radius(pixel.volume_bandwidth, level))))
+        Some(Volume::new(map, levels.map(|level| schedule.volume_bandwidth(pixel.volume_bandwidth, level))))
     }
 }
 

@@ -34,7 +34,7 @@ pub struct CameraWalkContext<'a> {
     /// Photons of the previous iteration; `None` if this camera path merges none. If no camera path of the pixel merges
     /// any, all etas, the factors of merging in MIS weights, must be [`mis::Eta::NONE`].
     pub photons: Option<&'a PhotonMap<MergePhoton>>,
-    /// Merging radii of the pixel of the camera path, by bandwidth level.
+    /// Merging bandwidths of the pixel of the camera path, by bandwidth level.
     pub levels: &'a MergeLevels,
 }
 

@@ -2,8 +2,8 @@
 //!
 //! One function per equation of Georgiev, "Implementing Vertex Connection and Merging" (2012), with its number in
 //! brackets; independent of the scene. With the balance heuristic all partial sums are affine in `eta = pi r^2 n_VM /
-//! n_VC`, the only factor that contains the merging radius. The two coefficients are kept separately, and `eta` is
-//! inserted when a weight is evaluated. So the radius may differ by pixel, level and iteration, and photons of one
+//! n_VC`, the only factor that contains the merging bandwidth. The two coefficients are kept separately, and `eta` is
+//! inserted when a weight is evaluated. So the bandwidth may differ by pixel, level and iteration, and photons of one
 //! iteration may be merged in the next. Since `dVM = dVC / eta` holds at the start and (34) to (36) preserve it, one
 //! pair of coefficients serves both. [`Eta::NONE`] is bidirectional path tracing; [`Eta::MERGE_ONLY`] leaves merging as
 //! the only technique.
@@ -67,11 +67,11 @@ impl Eta {
     /// Eta of methods that have no technique but merging.
     pub const MERGE_ONLY: Eta = Eta { value: f64::INFINITY, worth: DVec2::ONE };
 
-    /// Eta for merging within a squared radius, where `light_paths` is the number of merged light paths of an iteration
+    /// Eta for merging within a squared bandwidth, where `light_paths` is the number of merged light paths of an iteration
     /// per connected one. Merges count as independent samples.
     #[inline]
-    pub fn new(radius2: f32, light_paths: f32) -> Eta {
-        Eta { value: std::f64::consts::PI * f64::from(radius2) * f64::from(light_paths), worth: DVec2::ONE }
+    pub fn new(bandwidth2: f32, light_paths: f32) -> Eta {
+        Eta { value: std::f64::consts::PI * f64::from(bandwidth2) * f64::from(light_paths), worth: DVec2::ONE }
     }
 
     /// Lowers the worth of merges, which are not independent. What a pixel shows by delta bounces alone merges with photons

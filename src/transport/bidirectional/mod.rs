@@ -311,10 +311,10 @@ pub trait PathRecorder {
 
 impl PathRecorder for () {}
 
-/// Merging radii of the bandwidth levels of a pixel, ascending, each with its eta (factor of merging in MIS weights).
+/// Merging bandwidths of the bandwidth levels of a pixel, ascending, each with its eta (factor of merging in MIS weights).
 #[derive(Clone, Copy, Debug)]
 pub struct MergeLevels {
-    radius2: [f32; crate::transport::MAX_LEVELS],
+    bandwidth2: [f32; crate::transport::MAX_LEVELS],
     eta: [Eta; crate::transport::MAX_LEVELS],
     count: usize,
     /// Probability that a camera path of the pixel merges, which eta contains.
@@ -322,17 +322,17 @@ pub struct MergeLevels {
 }
 
 impl MergeLevels {
-    /// Takes squared radii in ascending order (at most [`crate::transport::MAX_LEVELS`]), each with its eta.
+    /// Takes squared bandwidths in ascending order (at most [`crate::transport::MAX_LEVELS`]), each with its eta.
     #[inline]
     pub fn new(levels: impl Iterator<Item = (f32, Eta)>) -> MergeLevels {
         let mut all = MergeLevels {
-            radius2: [0.0; crate::transport::MAX_LEVELS],
+            bandwidth2: [0.0; crate::transport::MAX_LEVELS],
             eta: [Eta::NONE; crate::transport::MAX_LEVELS],
             count: 0,
             probability: 1.0,
         };
-        for (radius2, eta) in levels.take(crate::transport::MAX_LEVELS) {
-            all.radius2[all.count] = radius2;
+        for (bandwidth2, eta) in levels.take(crate::transport::MAX_LEVELS) {
+            all.bandwidth2[all.count] = bandwidth2;
             all.eta[all.count] = eta;
             all.count += 1;
         }
@@ -352,13 +352,13 @@ impl MergeLevels {
         self.probability
     }
 
-    /// Squared merging radii in ascending order (square scene units).
+    /// Squared merging bandwidths in ascending order (square scene units).
     #[inline]
-    pub fn radius2(&self) -> &[f32] {
-        &self.radius2[..self.count]
+    pub fn bandwidth2(&self) -> &[f32] {
+        &self.bandwidth2[..self.count]
     }
 
-    /// Eta of each radius: the factor of merging in MIS weights.
+    /// Eta of each bandwidth: the factor of merging in MIS weights.
     #[inline]
     pub fn eta(&self) -> &[Eta] {
         &self.eta[..self.count]

@@ -139,9 +139,9 @@ impl Merge<'_> {
         mut add: impl FnMut(PathClass, usize, Rgb),
         difference: &mut Rgb,
     ) -> bool {
-        let radii = self.levels.radius2();
+        let bandwidths = self.levels.bandwidth2();
         let mut finite = true;
-        let Some(&largest) = radii.last() else { return finite };
+        let Some(&largest) = bandwidths.last() else { return finite };
         let (ng, shading) = (vertex.surface.ng, vertex.shading);
         let mut photon_shares = PhotonShares::new(vertex, self.suffix, self.classes);
         self.photons.within(vertex.surface.p, largest, |photon, distance2| {
@@ -168,11 +168,11 @@ impl Merge<'_> {
             record.contribution(technique, value, photon.p, ratios);
             let here = || vertex.first_scatter(photon.wi, Transport::Radiance, LobeSet::ALL, f);
             let first = self.lobes.map_or(FirstScatter::Emit, |lobes| lobes.arriving(here));
-            for (level, (&radius2, &eta)) in radii.iter().zip(self.levels.eta()).enumerate() {
-                if distance2 < radius2 {
+            for (level, (&bandwidth2, &eta)) in bandwidths.iter().zip(self.levels.eta()).enumerate() {
+                if distance2 < bandwidth2 {
                     let weight = ratios.merge_weight(eta);
-                    let area = radius2 * self.levels.probability();
-                    let inner = f32::from(distance2 * INNER_AREAS < radius2);
+                    let area = bandwidth2 * self.levels.probability();
+                    let inner = f32::from(distance2 * INNER_AREAS < bandwidth2);
                     for (class, share) in shares.iter() {
                         let light = value * share * (FRAC_1_PI / area);
                         let of = PathKind { class, group: photon.group, first };

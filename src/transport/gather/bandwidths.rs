@@ -1,4 +1,4 @@
-//! The interface between gathering and bandwidth rules: a rule gives the radii at each vertex of a camera path, and
+//! The interface between gathering and bandwidth rules: a rule gives the bandwidths at each vertex of a camera path, and
 //! counts the photons found there.
 
 use crate::math::Vec3;
@@ -6,47 +6,47 @@ use crate::photon::{ByKind, Kind, PhotonMap, ThinningKey};
 use crate::transport::walk::pixel_sample::MAX_LEVELS;
 use wide::f32x8;
 
-/// Squared gathering radii of the bandwidth levels of one camera path, in ascending order.
+/// Squared bandwidths of the bandwidth levels of one camera path, in ascending order.
 #[derive(Clone, Copy, Debug)]
-pub struct LevelRadii {
-    pub(in crate::transport) radius2: [f32; MAX_LEVELS],
+pub struct LevelBandwidths {
+    pub(in crate::transport) bandwidth2: [f32; MAX_LEVELS],
     pub(in crate::transport) count: usize,
-    /// Largest squared radius after the camera path's first broad bounce (square scene units).
+    /// Largest squared bandwidth after the camera path's first broad bounce (square scene units).
     pub(in crate::transport) indirect_cap2: f32,
-    /// The bandwidth level that each radius belongs to.
+    /// The bandwidth level that each bandwidth belongs to.
     pub(in crate::transport) order: [u8; MAX_LEVELS],
 }
 
-impl LevelRadii {
-    /// Takes squared radii of at most [`MAX_LEVELS`] levels, in ascending order from level 0.
+impl LevelBandwidths {
+    /// Takes squared bandwidths of at most [`MAX_LEVELS`] levels, in ascending order from level 0.
     #[inline]
-    pub fn new(radius2: impl Iterator<Item = f32>) -> LevelRadii {
-        let mut radii = LevelRadii {
-            radius2: [0.0; MAX_LEVELS],
+    pub fn new(bandwidth2: impl Iterator<Item = f32>) -> LevelBandwidths {
+        let mut bandwidths = LevelBandwidths {
+            bandwidth2: [0.0; MAX_LEVELS],
             count: 0,
             indirect_cap2: f32::INFINITY,
             order: std::array::from_fn(|level| level as u8),
         };
-        for r in radius2.take(MAX_LEVELS) {
-            radii.radius2[radii.count] = r;
-            radii.count += 1;
+        for r in bandwidth2.take(MAX_LEVELS) {
+            bandwidths.bandwidth2[bandwidths.count] = r;
+            bandwidths.count += 1;
         }
-        radii
+        bandwidths
     }
 
-    /// Caps squared radii at `indirect_cap2` after the path's first broad bounce. A pixel that sees few photons has a
-    /// large radius. Its path may arrive where photons are dense, and there a smaller one suffices.
+    /// Caps squared bandwidths at `indirect_cap2` after the path's first broad bounce. A pixel that sees few photons has a
+    /// large bandwidth. Its path may arrive where photons are dense, and there a smaller one suffices.
     #[inline]
     #[must_use]
-    pub fn capped_after_broad_bounce(self, indirect_cap2: f32) -> LevelRadii {
-        LevelRadii { indirect_cap2, ..self }
+    pub fn capped_after_broad_bounce(self, indirect_cap2: f32) -> LevelBandwidths {
+        LevelBandwidths { indirect_cap2, ..self }
     }
 
-    /// Assigns the radii to the levels in `order` (each below [`MAX_LEVELS`]).
+    /// Assigns the bandwidths to the levels in `order` (each below [`MAX_LEVELS`]).
     #[inline]
     #[must_use]
-    pub fn with_order(self, order: [u8; MAX_LEVELS]) -> LevelRadii {
-        LevelRadii { order, ..self }
+    pub fn with_order(self, order: [u8; MAX_LEVELS]) -> LevelBandwidths {
+        LevelBandwidths { order, ..self }
     }
 }
 
@@ -80,7 +80,7 @@ pub(in crate::transport) fn first_lane(x: f32, others: f32) -> f32x8 {
     f32x8::from([x, others, others, others, others, others, others, others])
 }
 
-/// The gathering radii of one camera path, and how its photons are counted.
+/// The bandwidths of one camera path, and how its photons are counted.
 pub trait GatherBandwidths {
     /// Coordinate frame of a vertex, as the counter needs it.
     type Frame;
@@ -92,9 +92,9 @@ pub trait GatherBandwidths {
     /// The frame of a vertex with geometric normal `ng`.
     fn frame(ng: Vec3) -> Self::Frame;
 
-    /// Gathering radii for photons of `kind` at a vertex at `p` with geometric normal `ng`, where the camera path has
+    /// Bandwidths for photons of `kind` at a vertex at `p` with geometric normal `ng`, where the camera path has
     /// this `length`.
-    fn radii(&mut self, kind: Kind, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii;
+    fn levels(&mut self, kind: Kind, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelBandwidths;
 
     /// The counter of the photons of `kind` that are found at a vertex.
     fn counter<'c>(&'c mut self, kind: Kind, frame: &'c Self::Frame) -> Self::Counter<'c>;
@@ -112,7 +112,7 @@ pub trait PhotonCounter {
     /// Counts photons within reach.
     fn count(&mut self, photons: &FoundPhotons);
 
-    /// Squared radius within which photons are counted; at least `largest2`, the largest bandwidth's.
+    /// Squared bandwidth within which photons are counted; at least `largest2`, the largest bandwidth's.
     #[inline]
     fn reach2(&self, largest2: f32) -> f32 {
         largest2
@@ -127,8 +127,8 @@ impl PhotonCounter for () {
     fn count(&mut self, _: &FoundPhotons) {}
 }
 
-/// Constant radii along the path, without counts.
-impl GatherBandwidths for ByKind<LevelRadii> {
+/// Constant bandwidths along the path, without counts.
+impl GatherBandwidths for ByKind<LevelBandwidths> {
     type Frame = ();
     type Counter<'c>
         = ()
@@ -139,7 +139,7 @@ impl GatherBandwidths for ByKind<LevelRadii> {
     fn frame(_: Vec3) {}
 
     #[inline]
-    fn radii(&mut self, kind: Kind, _: &PhotonMap, _: Vec3, _: Vec3, _: f32) -> LevelRadii {
+    fn levels(&mut self, kind: Kind, _: &PhotonMap, _: Vec3, _: Vec3, _: f32) -> LevelBandwidths {
         self[kind as usize]
     }
 

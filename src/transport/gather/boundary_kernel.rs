@@ -37,8 +37,8 @@ impl Volume<'_> {
         vertex: &MediumVertex,
         medium: u32,
     ) -> [f32; MAX_LEVELS] {
-        let radius2 = self.radii2();
-        let reach = radius2.iter().fold(0.0, |largest: f32, &radius2| largest.max(radius2)).sqrt();
+        let bandwidth2 = self.bandwidths2();
+        let reach = bandwidth2.iter().fold(0.0, |largest: f32, &bandwidth2| largest.max(bandwidth2)).sqrt();
         let draws = vertex.draws;
         let frame = Frame::from_normal(warp::sphere_uniform(draws.two(Purpose::Border)));
         let (sin, cos) = sin_cos_turns(draws.one(Purpose::BorderTurn));
@@ -57,8 +57,8 @@ impl Volume<'_> {
         for (k, hit) in hits.into_iter().enumerate() {
             let Some(hit) = hit else { continue };
             let mut lost = |from: f32, to: f32| {
-                for (mass_inside, &radius2) in mass_inside.iter_mut().zip(radius2) {
-                    let radius = radius2.sqrt();
+                for (mass_inside, &bandwidth2) in mass_inside.iter_mut().zip(bandwidth2) {
+                    let radius = bandwidth2.sqrt();
                     *mass_inside -= (mass(kernel, to / radius) - mass(kernel, from / radius)) / RAYS as f32;
                 }
             };

@@ -10,11 +10,11 @@
 //!
 //! `n pi r^2 e cos / pdf`
 //!
-//! photons within the radius r around X for every camera path. The contribution of one of them is bounded, however small
+//! photons within the bandwidth r around X for every camera path. The contribution of one of them is bounded, however small
 //! r is. Both sides must compute the same weight for a path, so both use e rounded down to a power of two
 //! ([`PhotonFlags::density`]).
 
-use super::bandwidths::LevelRadii;
+use super::bandwidths::LevelBandwidths;
 use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use crate::light::EmissionDensity;
 use crate::math::{Rgb, Vec3};
@@ -79,22 +79,22 @@ impl Glints {
         shading: &'s Shading<'s>,
         ng: Vec3,
         onward: Onward,
-        radii: &LevelRadii,
+        bandwidths: &LevelBandwidths,
         map: &PhotonMap,
     ) -> GlintGather<'s> {
         let paths = map.paths() as f32;
-        let count = if map.paths() == 0 { 0 } else { radii.count };
-        let radius2 = radii.radius2.map(|radius2| AREA_RATIO * radius2);
-        let areas = radius2.map(|radius2| paths * PI * radius2);
-        self.here = MergeAreas { areas, order: radii.order, count, going: onward.probability };
-        let reach2 = count.checked_sub(1).map_or(0.0, |last| radius2[last]);
+        let count = if map.paths() == 0 { 0 } else { bandwidths.count };
+        let bandwidth2 = bandwidths.bandwidth2.map(|bandwidth2| AREA_RATIO * bandwidth2);
+        let areas = bandwidth2.map(|bandwidth2| paths * PI * bandwidth2);
+        self.here = MergeAreas { areas, order: bandwidths.order, count, going: onward.probability };
+        let reach2 = count.checked_sub(1).map_or(0.0, |last| bandwidth2[last]);
         GlintGather {
             kernel,
             shading,
             ng,
             onward,
             paths,
-            radius2,
+            bandwidth2,
             largest: PI * reach2,
             reach2,
             sums: [Rgb::ZERO; MAX_LEVELS],
@@ -138,32 +138,32 @@ pub(in crate::transport) struct GlintGather<'s> {
     ng: Vec3,
     onward: Onward,
     paths: f32,
-    radius2: [f32; MAX_LEVELS],
+    bandwidth2: [f32; MAX_LEVELS],
     /// Area of the largest gathering kernel (square scene units).
     largest: f32,
-    /// Squared radius within which photons are evaluated (square scene units).
+    /// Squared bandwidth within which photons are evaluated (square scene units).
     reach2: f32,
     sums: [Rgb; MAX_LEVELS],
-    /// Index of the radius whose light is also recorded as reflected and transmitted light; `None` without such layers.
+    /// Index of the bandwidth whose light is also recorded as reflected and transmitted light; `None` without such layers.
     divided: Option<usize>,
-    /// Transmitted light of that radius.
+    /// Transmitted light of that bandwidth.
     transmitted: Rgb,
 }
 
 impl GlintGather<'_> {
-    /// Divides the light of the radius number `index` into reflected and transmitted light.
+    /// Divides the light of the bandwidth number `index` into reflected and transmitted light.
     #[inline]
     pub fn divide(&mut self, index: Option<usize>) {
         self.divided = index;
     }
 
-    /// Radiance so far by bandwidth level, in the order of radii.
+    /// Radiance so far by bandwidth level, in the order of bandwidths.
     #[inline]
     pub fn sums(&self) -> &[Rgb; MAX_LEVELS] {
         &self.sums
     }
 
-    /// Transmitted light of the divided radius.
+    /// Transmitted light of the divided bandwidth.
     #[inline]
     pub fn transmitted(&self) -> Rgb {
         self.transmitted
@@ -195,24 +195,24 @@ impl GlintGather<'_> {
         // Area in which one photon is expected for every camera path.
         let area_per_photon = pdf / (self.paths * photon.flags.density() * cos);
         let light = photon.flux * f / cosine;
-        for (sum, radius2) in self.sums.iter_mut().zip(self.radius2) {
-            if distance2 < radius2 {
-                let kernel = self.kernel.weight(distance2 / radius2);
+        for (sum, bandwidth2) in self.sums.iter_mut().zip(self.bandwidth2) {
+            if distance2 < bandwidth2 {
+                let kernel = self.kernel.weight(distance2 / bandwidth2);
                 // The weight over pi r^2; bounded however small the kernel is.
-                *sum += light * (kernel / (area_per_photon + PI * radius2));
+                *sum += light * (kernel / (area_per_photon + PI * bandwidth2));
             }
         }
-        if let Some(radius2) = self.divided.map(|index| self.radius2[index])
-            && distance2 < radius2
+        if let Some(bandwidth2) = self.divided.map(|index| self.bandwidth2[index])
+            && distance2 < bandwidth2
             && shading.transmits_to(photon.wi)
         {
-            let kernel = self.kernel.weight(distance2 / radius2);
-            self.transmitted += light * (kernel / (area_per_photon + PI * radius2));
+            let kernel = self.kernel.weight(distance2 / bandwidth2);
+            self.transmitted += light * (kernel / (area_per_photon + PI * bandwidth2));
         }
         light * (self.largest / (area_per_photon + self.largest))
     }
 
-    /// Radiance from the gathered photons by bandwidth level, in the order of radii.
+    /// Radiance from the gathered photons by bandwidth level, in the order of bandwidths.
     #[inline]
     pub fn finish(self) -> [Rgb; MAX_LEVELS] {
         self.sums
@@ -278,16 +278,16 @@ mod tests {
                 };
                 let mut glints = Glints::NONE;
                 let map = PhotonMap::build(vec![photon]).of_paths(PATHS);
-                let radii = LevelRadii::new(LEVELS.into_iter());
-                let mut merging = glints.gather(Kernel::Box, &shading, Vec3::Z, onward, &radii, &map);
+                let bandwidths = LevelBandwidths::new(LEVELS.into_iter());
+                let mut merging = glints.gather(Kernel::Box, &shading, Vec3::Z, onward, &bandwidths, &map);
                 merging.push(&photon, 0.0);
                 let merged = merging.finish();
                 let found = sample.wi.z.abs().recip() * shading.eval_cos(sample.wi, Transport::Radiance, lobes);
                 glints.scatter(Vec3::Z, &sample);
                 let weights: Vec<(usize, f32)> = glints.path_weights(&density).collect();
                 assert_eq!(weights.len(), LEVELS.len());
-                for ((level, weight), radius2) in weights.into_iter().zip(LEVELS) {
-                    let other = (merged[level] * (PI * AREA_RATIO * radius2) / found).x;
+                for ((level, weight), bandwidth2) in weights.into_iter().zip(LEVELS) {
+                    let other = (merged[level] * (PI * AREA_RATIO * bandwidth2) / found).x;
                     assert!((weight + other - 1.0).abs() < 1e-4, "{weight} {other}");
                     least = [least[0].min(weight), least[1].min(other)];
                 }
@@ -316,8 +316,8 @@ mod tests {
             [(known, PATHS, true), (known, 0, false), (Photon { flags: PhotonFlags::default(), ..known }, PATHS, false)]
         {
             let map = PhotonMap::build(vec![photon]).of_paths(paths);
-            let radii = LevelRadii::new(LEVELS.into_iter());
-            let mut merging = glints.gather(Kernel::Box, &shading, Vec3::Z, sharp, &radii, &map);
+            let bandwidths = LevelBandwidths::new(LEVELS.into_iter());
+            let mut merging = glints.gather(Kernel::Box, &shading, Vec3::Z, sharp, &bandwidths, &map);
             merging.push(&photon, 0.0);
             assert_eq!(merging.finish()[0].x > 0.0, merges);
         }

@@ -8,8 +8,8 @@ use crate::photon::{Kernel, Photon, PhotonFlags};
 pub(in crate::transport) struct LobeGather<'a> {
     kernel: Kernel,
     shading: &'a Shading<'a>,
-    /// Squared radius of the kernel (square scene units).
-    radius2: f32,
+    /// Squared bandwidth of the kernel (square scene units).
+    bandwidth2: f32,
     /// Lobes for most photons, and for photons whose light no continued path could find.
     sets: [LobeSet; 2],
     diffuse: Rgb,
@@ -17,14 +17,14 @@ pub(in crate::transport) struct LobeGather<'a> {
 }
 
 impl<'a> LobeGather<'a> {
-    pub fn new(kernel: Kernel, shading: &'a Shading<'a>, radius2: f32, sets: [LobeSet; 2]) -> LobeGather<'a> {
-        LobeGather { kernel, shading, radius2, sets, diffuse: Rgb::ZERO, transmitted: Rgb::ZERO }
+    pub fn new(kernel: Kernel, shading: &'a Shading<'a>, bandwidth2: f32, sets: [LobeSet; 2]) -> LobeGather<'a> {
+        LobeGather { kernel, shading, bandwidth2, sets, diffuse: Rgb::ZERO, transmitted: Rgb::ZERO }
     }
 
     /// Adds a photon at this squared distance.
     #[inline(never)]
     pub fn push(&mut self, photon: &Photon, distance2: f32) {
-        if distance2 >= self.radius2 {
+        if distance2 >= self.bandwidth2 {
             return;
         }
         let set = self.sets[usize::from(photon.flags == PhotonFlags::UNREACHABLE)];
@@ -32,7 +32,7 @@ impl<'a> LobeGather<'a> {
         if value == Rgb::ZERO {
             return;
         }
-        let light = value * photon.flux * self.kernel.weight(distance2 / self.radius2);
+        let light = value * photon.flux * self.kernel.weight(distance2 / self.bandwidth2);
         let whole = self.shading.eval_cos(photon.wi, Transport::Radiance, set);
         let [diffuse, _, transmitted] = self.shading.lobe_shares(photon.wi, Transport::Radiance, set, whole);
         self.diffuse += light * diffuse;

@@ -59,28 +59,30 @@ impl<B: GatherBandwidths> GatheringWalk<'_, B> {
     ) {
         let (p, ng) = (vertex.surface.p, vertex.surface.ng);
         let photons = &self.photons[kind as usize];
-        let mut radii = self.bandwidths.radii(kind, photons, p, ng, self.length);
+        let mut bandwidths = self.bandwidths.levels(kind, photons, p, ng, self.length);
         if self.paths && self.scattered_broadly {
-            let largest2 = radii.radius2[radii.count.saturating_sub(1)];
-            let factor = (radii.indirect_cap2 / largest2).min(1.0);
-            radii.radius2.iter_mut().for_each(|radius2| *radius2 *= factor);
+            let largest2 = bandwidths.bandwidth2[bandwidths.count.saturating_sub(1)];
+            let factor = (bandwidths.indirect_cap2 / largest2).min(1.0);
+            bandwidths.bandwidth2.iter_mut().for_each(|bandwidth2| *bandwidth2 *= factor);
         }
         let sharp = onward.lobes & LobeSet::SHARP;
         let shared = kind == Kind::Caustic
             && !sharp.is_empty()
             && self.classes.has(self.suffix.then(Event::Sharp).class_with(LightPrefix::FOCUSED));
-        let mut glints = shared.then(|| self.glints.gather(self.kernel, vertex.shading, ng, onward, &radii, photons));
-        let (order, radii) = (radii.order, &radii.radius2[..radii.count]);
-        // Index of the radius whose light is recorded by the lobe of the first hit.
+        let mut glints =
+            shared.then(|| self.glints.gather(self.kernel, vertex.shading, ng, onward, &bandwidths, photons));
+        let (order, bandwidths) = (bandwidths.order, &bandwidths.bandwidth2[..bandwidths.count]);
+        // Index of the bandwidth whose light is recorded by the lobe of the first hit.
         let recorded = self.record.as_ref().and_then(|lobes| lobes.level);
-        let recorded = recorded.and_then(|level| order[..radii.len()].iter().position(|k| usize::from(*k) == level));
+        let recorded =
+            recorded.and_then(|level| order[..bandwidths.len()].iter().position(|k| usize::from(*k) == level));
         let divided = recorded.filter(|_| self.divides());
         if let Some(glints) = &mut glints {
             glints.divide(divided);
         }
         let mut lobe_gather =
-            divided.map(|k| LobeGather::new(self.kernel, vertex.shading, radii[k], [broad, broad | sharp]));
-        let Some(&largest) = radii.last() else { return };
+            divided.map(|k| LobeGather::new(self.kernel, vertex.shading, bandwidths[k], [broad, broad | sharp]));
+        let Some(&largest) = bandwidths.last() else { return };
         let longest = self.max_depth - vertex.depth;
         let mut counter = self.bandwidths.counter(kind, frame);
         let reach2 = counter.reach2(largest);
@@ -89,7 +91,7 @@ impl<B: GatherBandwidths> GatheringWalk<'_, B> {
         if let Some(glints) = glints.as_mut().filter(|_| counts) {
             glints.extend_reach(reach2);
         }
-        let mut batch = Batch::new(self.kernel, radii, self.waiting, vertex, broad, broad | sharp);
+        let mut batch = Batch::new(self.kernel, bandwidths, self.waiting, vertex, broad, broad | sharp);
         let Presence { absent, .. } = vertex.presence(self.scene);
         let near = &mut self.near[kind as usize];
         let push = |photon: &Photon, distance2| {
@@ -115,7 +117,7 @@ impl<B: GatherBandwidths> GatheringWalk<'_, B> {
         drop(counter);
         if let Some(k) = recorded {
             let glint = glints.as_ref().map_or([Rgb::ZERO; 2], |glints| [glints.sums()[k], glints.transmitted()]);
-            let scale = FRAC_1_PI / radii[k];
+            let scale = FRAC_1_PI / bandwidths[k];
             if let Some(lobe_gather) = &lobe_gather {
                 let [diffuse, glossy, transmitted] = lobe_gather.divide(sums[k]).map(|sum| sum * scale);
                 let by_lobe = [diffuse, glossy + glint[0] - glint[1], transmitted + glint[1]];
@@ -128,8 +130,8 @@ impl<B: GatherBandwidths> GatheringWalk<'_, B> {
         }
         let into = if caustic { &mut self.sample.caustic_photons } else { &mut self.sample.indirect_photons };
         let mut finite = true;
-        for ((level, sum), radius2) in order.into_iter().zip(sums).zip(radii) {
-            let light = vertex.throughput * (FRAC_1_PI / radius2) * sum;
+        for ((level, sum), bandwidth2) in order.into_iter().zip(sums).zip(bandwidths) {
+            let light = vertex.throughput * (FRAC_1_PI / bandwidth2) * sum;
             finite &= light.is_finite();
             into[usize::from(level)] += light;
         }

@@ -65,7 +65,7 @@ fn dot(a: &[f32x8; 3], b: &[f32x8; 3]) -> f32x8 {
 /// Photons of one kind that wait for their BSDF at a vertex, and the sums of the evaluated ones.
 pub(in crate::transport) struct Batch<'a, 's> {
     kernel: Kernel,
-    radii: &'s [f32],
+    bandwidths: &'s [f32],
     p: Vec3,
     throughput: Rgb,
     gathering: Gathering<'a>,
@@ -77,12 +77,12 @@ pub(in crate::transport) struct Batch<'a, 's> {
 }
 
 impl<'a, 's> Batch<'a, 's> {
-    /// `radii` are squared and ascending. Photons are evaluated with the lobes of `set`, those that no continued path
+    /// `bandwidths` are squared and ascending. Photons are evaluated with the lobes of `set`, those that no continued path
     /// could find with the lobes of `all`.
     #[inline]
     pub fn new(
         kernel: Kernel,
-        radii: &'s [f32],
+        bandwidths: &'s [f32],
         waiting: &'s mut Waiting,
         vertex: &Vertex<'a, '_>,
         set: LobeSet,
@@ -91,7 +91,7 @@ impl<'a, 's> Batch<'a, 's> {
         let shading = vertex.shading;
         Batch {
             kernel,
-            radii,
+            bandwidths,
             p: vertex.surface.p,
             throughput: vertex.throughput,
             gathering: shading.gathering(set),
@@ -162,19 +162,19 @@ impl<'a, 's> Batch<'a, 's> {
         self.waiting.count = 0;
     }
 
-    /// Adds the light of eight photons to each bandwidth level whose radius exceeds their distance.
+    /// Adds the light of eight photons to each bandwidth level whose bandwidth exceeds their distance.
     #[inline(always)]
     fn add<C: PhotonCounter>(&mut self, light: &[f32x8; 3], distance2: f32x8) {
-        // With one level, each photon within reach is within its radius.
-        if self.kernel == Kernel::Box && !C::BEYOND && self.radii.len() == 1 {
+        // With one level, each photon within reach is within its bandwidth.
+        if self.kernel == Kernel::Box && !C::BEYOND && self.bandwidths.len() == 1 {
             self.sums[0].iter_mut().zip(light).for_each(|(sum, light)| *sum += *light);
             return;
         }
-        for (sums, &radius2) in self.sums.iter_mut().zip(self.radii) {
-            let within = distance2.cmp_lt(f32x8::splat(radius2));
+        for (sums, &bandwidth2) in self.sums.iter_mut().zip(self.bandwidths) {
+            let within = distance2.cmp_lt(f32x8::splat(bandwidth2));
             let weight = match self.kernel {
                 Kernel::Box => f32x8::ONE,
-                kernel => f32x8::from((distance2 / radius2).to_array().map(|s| kernel.weight(s))),
+                kernel => f32x8::from((distance2 / bandwidth2).to_array().map(|s| kernel.weight(s))),
             };
             for (sum, light) in sums.iter_mut().zip(light) {
                 // Unused lanes are infinitely far away, where the product is NaN, so the mask comes last.

@@ -11,32 +11,32 @@ use crate::transport::walk::pixel_sample::MAX_LEVELS;
 use crate::transport::walk::vertex::MediumVertex;
 use std::f32::consts::FRAC_1_PI;
 
-/// The photons in media, and the gathering radii of the bandwidth levels of a camera path.
+/// The photons in media, and the bandwidths of the bandwidth levels of a camera path.
 #[derive(Clone, Copy)]
 pub struct Volume<'a> {
     photons: &'a PhotonMap<VolumePhoton>,
-    /// Squared gathering radii of the bandwidth levels, in any order.
-    radius2: [f32; MAX_LEVELS],
+    /// Squared bandwidths of the bandwidth levels, in any order.
+    bandwidth2: [f32; MAX_LEVELS],
     count: usize,
 }
 
 impl<'a> Volume<'a> {
-    /// Takes the gathering radii of at most [`MAX_LEVELS`] bandwidth levels, in the order in which results are
+    /// Takes the bandwidths of at most [`MAX_LEVELS`] bandwidth levels, in the order in which results are
     /// returned.
     #[inline]
-    pub fn new(photons: &'a PhotonMap<VolumePhoton>, radii: impl Iterator<Item = f32>) -> Volume<'a> {
-        let mut volume = Volume { photons, radius2: [0.0; MAX_LEVELS], count: 0 };
-        for radius in radii.take(MAX_LEVELS) {
-            volume.radius2[volume.count] = radius * radius;
+    pub fn new(photons: &'a PhotonMap<VolumePhoton>, bandwidths: impl Iterator<Item = f32>) -> Volume<'a> {
+        let mut volume = Volume { photons, bandwidth2: [0.0; MAX_LEVELS], count: 0 };
+        for bandwidth in bandwidths.take(MAX_LEVELS) {
+            volume.bandwidth2[volume.count] = bandwidth * bandwidth;
             volume.count += 1;
         }
         volume
     }
 
-    /// Squared gathering radii of the bandwidth levels, in the order in which results are returned.
+    /// Squared bandwidths of the bandwidth levels, in the order in which results are returned.
     #[inline]
-    pub(in crate::transport) fn radii2(&self) -> &[f32] {
-        &self.radius2[..self.count]
+    pub(in crate::transport) fn bandwidths2(&self) -> &[f32] {
+        &self.bandwidth2[..self.count]
     }
 
     /// Radiance by level that the photons in `medium` scatter at `vertex`, from one query: kernel density estimation
@@ -51,8 +51,8 @@ impl<'a> Volume<'a> {
         longest: u32,
     ) -> [Rgb; MAX_LEVELS] {
         let mut sums = [Rgb::ZERO; MAX_LEVELS];
-        let radius2 = self.radii2();
-        let largest2 = radius2.iter().fold(0.0, |largest: f32, &radius2| largest.max(radius2));
+        let bandwidth2 = self.bandwidths2();
+        let largest2 = bandwidth2.iter().fold(0.0, |largest: f32, &bandwidth2| largest.max(bandwidth2));
         let phase = vertex.phase();
         self.photons.gather(near, vertex.arrival.p, NO_NORMAL, largest2, |photon, distance2| {
             if photon.medium != medium || u32::from(photon.depth) > longest {
@@ -64,14 +64,14 @@ impl<'a> Volume<'a> {
                 .map_or(Some(Rgb::ONE), |wavelength| wavelength.connection_factor(photon.band));
             let Some(weight) = meets else { return };
             let light = photon.flux * weight * phase.pdf_w(vertex.wo, photon.wi);
-            for (sum, &radius2) in sums.iter_mut().zip(radius2) {
-                if distance2 < radius2 {
-                    *sum += light * kernel.ball_weight(distance2 / radius2);
+            for (sum, &bandwidth2) in sums.iter_mut().zip(bandwidth2) {
+                if distance2 < bandwidth2 {
+                    *sum += light * kernel.ball_weight(distance2 / bandwidth2);
                 }
             }
         });
-        for (sum, radius2) in sums.iter_mut().zip(radius2) {
-            *sum *= vertex.throughput * (0.75 * FRAC_1_PI / (radius2 * radius2.sqrt()));
+        for (sum, bandwidth2) in sums.iter_mut().zip(bandwidth2) {
+            *sum *= vertex.throughput * (0.75 * FRAC_1_PI / (bandwidth2 * bandwidth2.sqrt()));
         }
         sums
     }
@@ -128,15 +128,15 @@ mod tests {
     /// phase function scatters 1 / (4 pi) of it into every direction, for all bandwidths and orders of levels.
     /// `roughness` is the integral of the squared kernel over that of the box; `fault` is a factor of the result.
     fn deviation(map: &PhotonMap<VolumePhoton>, (kernel, roughness): (Kernel, f32), fault: f32) -> f32 {
-        let radii = [0.4f32, 0.1, 0.2, 0.15, 0.3];
-        let volume = Volume::new(map, radii.into_iter());
+        let bandwidths = [0.4f32, 0.1, 0.2, 0.15, 0.3];
+        let volume = Volume::new(map, bandwidths.into_iter());
         let mut worst = 0f32;
         for longest in [2, 3] {
             let found = volume.gather(kernel, &mut Near::default(), &vertex(), 7, longest);
             // Half of the photons have two segments, half three.
             let share = 0.5 * (longest - 1) as f32;
-            for (found, radius) in found.into_iter().zip(radii) {
-                let ball = 4.0 / 3.0 * std::f32::consts::PI * radius.powi(3);
+            for (found, bandwidth) in found.into_iter().zip(bandwidths) {
+                let ball = 4.0 / 3.0 * std::f32::consts::PI * bandwidth.powi(3);
                 // Weights by the phase function with g = 0.3 vary: their mean square is (1 + g^2) / (1 - g^2)^2 in
                 // units of the mean.
                 let error = (1.32 * roughness / (PHOTONS as f32 * ball * share)).sqrt();

@@ -170,7 +170,7 @@ impl<'a, const THROUGH: bool> Visitor<'a> for Count<'_, THROUGH> {
 }
 
 impl VertexCounts {
-    /// Counts the vertices of paths of a view. `guide` guides the light paths. `reach(length)` is the merging radius of
+    /// Counts the vertices of paths of a view. `guide` guides the light paths. `reach(length)` is the merging bandwidth of
     /// a camera path of that length at its first merging vertex.
     pub fn new(
         camera_paths: &CameraPaths<'_>,
@@ -205,9 +205,9 @@ impl VertexCounts {
         let open = camera.iter().map(|count| count.open.len() as u64).sum::<u64>();
         let step = if open > MAX_VERTICES { (open / MERGING_VERTICES) as usize } else { 1 };
         let merged = |count: &Count<'_, false>| {
-            let (mut merged, radius2) = (0u64, reach(count.length).powi(2) * larger);
+            let (mut merged, bandwidth2) = (0u64, reach(count.length).powi(2) * larger);
             for open in count.open.iter().step_by(step) {
-                map.within(open.p, radius2, |other, _| merged += u64::from(same_surface(other, open.ng)));
+                map.within(open.p, bandwidth2, |other, _| merged += u64::from(same_surface(other, open.ng)));
             }
             merged
         };

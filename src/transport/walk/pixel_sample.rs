@@ -5,7 +5,7 @@ use super::segment::FirstHit;
 use crate::bsdf::LobeSet;
 use crate::math::{Rgb, Vec3};
 
-/// Largest number of bandwidth levels (gathering radii) of one camera path.
+/// Largest number of bandwidth levels (bandwidths) of one camera path.
 pub const MAX_LEVELS: usize = 5;
 
 /// G-buffer of one camera path, at its first vertex that scatters broadly; at its last narrow one if there is none, and
@@ -58,7 +58,7 @@ impl BranchFeatures {
     }
 }
 
-/// Area within the merging radius over that within a quarter of it, whose photons show the bias of merging.
+/// Area within the merging bandwidth over that within a quarter of it, whose photons show the bias of merging.
 pub const INNER_AREAS: f32 = 16.0;
 
 /// The contribution of one camera path to its pixel. Radiance is linear RGB.
@@ -78,7 +78,7 @@ pub struct PixelSample {
     pub volume: Rgb,
     /// Light whose first vertex (apart from clear ones) lies in a medium, as far as it depends on a bandwidth, by level.
     pub volume_photons: [Rgb; MAX_LEVELS],
-    /// With one bandwidth: merged light less its estimate within a quarter of the radius, over [`INNER_AREAS`].
+    /// With one bandwidth: merged light less its estimate within a quarter of the bandwidth, over [`INNER_AREAS`].
     pub merge_difference: Rgb,
     /// G-buffer of the camera path.
     pub features: Features,

@@ -8,9 +8,9 @@ fn photon(p: Vec3, flux: f32) -> Photon {
 }
 
 /// Number of photons that a query visits.
-fn visited(map: &PhotonMap, p: Vec3, radius2: f32) -> u64 {
+fn visited(map: &PhotonMap, p: Vec3, bandwidth2: f32) -> u64 {
     let mut count = 0;
-    map.within(p, radius2, |_, _| count += 1);
+    map.within(p, bandwidth2, |_, _| count += 1);
     count
 }
 
@@ -23,7 +23,7 @@ fn maps_of_no_photons_one_and_fewer_than_requested() {
         assert_eq!(visited(&map, Vec3::ZERO, 0.0), 0);
         let mut nearest = Nearest::default();
         for k in 1..=20 {
-            let found = nearest.radius2(&map, Vec3::ZERO, Vec3::Z, k, f32::INFINITY);
+            let found = nearest.bandwidth2(&map, Vec3::ZERO, Vec3::Z, k, f32::INFINITY);
             assert_eq!(found, (k <= count).then(|| ((k - 1) * (k - 1)) as f32), "{k} of {count}");
         }
     }
@@ -64,8 +64,8 @@ fn a_million_in_one_point() {
     }
     let mut nearest = Nearest::default();
     for k in [1, 10, MAX_NEIGHBOURS] {
-        assert_eq!(nearest.radius2(&map, p, Vec3::Z, k, f32::INFINITY), Some(0.0));
-        let found = nearest.radius2(&map, beside, Vec3::Z, k, f32::INFINITY).expect("there are enough");
+        assert_eq!(nearest.bandwidth2(&map, p, Vec3::Z, k, f32::INFINITY), Some(0.0));
+        let found = nearest.bandwidth2(&map, beside, Vec3::Z, k, f32::INFINITY).expect("there are enough");
         assert!((found.sqrt() - 0.01).abs() < 1e-6, "{found}");
     }
 }

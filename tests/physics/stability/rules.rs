@@ -22,9 +22,9 @@ fn memoryless_rules_follow_their_product() {
         let (mut product, mut worst) = (Exact::new(1.0), [0.0f64; 2]);
         for i in 1..=MILLION {
             if i % 16 == 1 {
-                let cube = volume::radius_factor(i, alpha);
+                let cube = volume::bandwidth_factor(i, alpha);
                 let cube = Exact::new(cube) * Exact::new(cube) * Exact::new(cube);
-                worst[0] = worst[0].max(product.error_of(memoryless::radius2_factor(i, alpha)));
+                worst[0] = worst[0].max(product.error_of(memoryless::bandwidth2_factor(i, alpha)));
                 worst[1] = worst[1].max(product.error_of(cube.value()));
             }
             let k = Exact::new(i as f64);
@@ -40,27 +40,27 @@ fn memoryless_rules_follow_their_product() {
 fn local_statistics_follow_their_recursion() {
     let rule = LocalStatistics { alpha: 2.0 / 3.0 };
     let mut ours = [rule.initial(1.0, 10.0, 0)];
-    let (mut radius2, mut photons, mut single) = (Exact::new(1.0), Exact::default(), 1.0f32);
+    let (mut bandwidth2, mut photons, mut single) = (Exact::new(1.0), Exact::default(), 1.0f32);
     let alpha = Exact::new(rule.alpha);
     for i in 1..=MILLION {
         let found = (i % 3 + 1) as u32;
         rule.update(i, &mut ours, &mut [], &mut [found, 0, 0, 0, 0]);
         let new = Exact::new(f64::from(found));
         let factor = (photons + alpha * new) / (photons + new);
-        (photons, radius2) = (photons + alpha * new, radius2 * factor);
+        (photons, bandwidth2) = (photons + alpha * new, bandwidth2 * factor);
         single = (f64::from(single) * factor.value()) as f32;
     }
-    let errors = [radius2.error_of(ours[0].radius2), photons.error_of(ours[0].photons)];
-    let in_f32 = radius2.error_of(f64::from(single));
+    let errors = [bandwidth2.error_of(ours[0].squared), photons.error_of(ours[0].photons)];
+    let in_f32 = bandwidth2.error_of(f64::from(single));
     println!("radius squared and photons off by {errors:?}, a radius in f32 by {in_f32:.1e}");
     assert!(errors.iter().all(|&error| error < 1e-9), "{errors:?}");
     assert!(in_f32 > 1e-6, "{in_f32:e}");
 }
 
 /// A photon in the frame of +Z: its distance as a share of the radius, and its azimuth as a share of the circle.
-fn found(radius2: f32, distance: f32, turn: f32) -> FoundPhotons {
+fn found(bandwidth2: f32, distance: f32, turn: f32) -> FoundPhotons {
     let (sin, cos) = (std::f32::consts::TAU * turn).sin_cos();
-    let distance = distance * radius2.sqrt();
+    let distance = distance * bandwidth2.sqrt();
     let frame = Frame::from_normal(Vec3::Z);
     FoundPhotons::one((frame.t * cos + frame.b * sin) * distance, distance * distance, 1.0, ThinningKey::new(1.0, 0.5))
 }
@@ -68,7 +68,7 @@ fn found(radius2: f32, distance: f32, turn: f32) -> FoundPhotons {
 /// The chi-squared rule with integer counts, for two annuli of six sectors.
 struct Oracle {
     counts: [u64; 12],
-    radius2: Exact,
+    bandwidth2: Exact,
     bound: Exact,
     /// Number of reductions.
     reductions: u32,
@@ -88,7 +88,7 @@ impl Oracle {
             return;
         }
         let factor = if passes(&self.counts[..6], critical[1]) { 0.5 } else { 0.8 };
-        self.radius2 = self.radius2 * Exact::new(factor);
+        self.bandwidth2 = self.bandwidth2 * Exact::new(factor);
         self.bound = self.bound * Exact::new(1.2);
         (self.counts, self.reductions) = ([0; 12], self.reductions + 1);
     }
@@ -106,7 +106,7 @@ fn the_chi_squared_rule_decides_as_exact_counts_do() {
     let (mut ours, mut counts) = ([rule.initial(1.0, 10.0, 0)], [0u32; 12]);
     let (mut alike, mut alike_counts) = ([thinned.initial(1.0, 10.0, 0)], [0u32; 13]);
     let bound = Exact::new(f64::from(MIN_BOUND));
-    let mut oracle = Oracle { counts: [0; 12], radius2: Exact::new(1.0), bound, reductions: 0 };
+    let mut oracle = Oracle { counts: [0; 12], bandwidth2: Exact::new(1.0), bound, reductions: 0 };
     // Quantiles for 11 and 5 degrees of freedom at 1e-3.
     let critical = [31.264_133_6, 20.515_005_7];
     for i in 1..=MILLION {
@@ -117,7 +117,7 @@ fn the_chi_squared_rule_decides_as_exact_counts_do() {
             2 => (i / 5 % 6, u64::from(!i.is_multiple_of(5))),
             _ => (i % 6, i / 6 % 2),
         };
-        let photon = found(ours[0].radius2, 0.5 + 0.4 * outer as f32, (sector as f32 + 0.5) / 6.0);
+        let photon = found(ours[0].squared, 0.5 + 0.4 * outer as f32, (sector as f32 + 0.5) / 6.0);
         let (mut tally, mut alike_tally) = Default::default();
         let least = f64::from(ours[0].bound);
         // The lower half is numbered in reverse.
@@ -131,7 +131,8 @@ fn the_chi_squared_rule_decides_as_exact_counts_do() {
         assert_eq!(alike[0], ours[0], "iteration {i}");
     }
     let allowed = 1.2e-7 * f64::from(oracle.reductions);
-    let errors = [oracle.radius2.error_of(f64::from(ours[0].radius2)), oracle.bound.error_of(f64::from(ours[0].bound))];
+    let errors =
+        [oracle.bandwidth2.error_of(f64::from(ours[0].squared)), oracle.bound.error_of(f64::from(ours[0].bound))];
     println!("{} reductions: radius squared and bound off by {errors:?}", oracle.reductions);
     assert!(oracle.reductions > 20 && errors.iter().all(|&error| error < allowed), "{errors:?}, {allowed:e}");
 }
@@ -147,9 +148,9 @@ fn the_adaptive_rule_follows_its_sums() {
     let mut pilot2 = 4.0f32;
     for i in 1..=MILLION {
         // Within the bandwidth, then within the kernel of the Laplacian.
-        let radius2 = f64::from(ours[0].radius2);
+        let bandwidth2 = f64::from(ours[0].squared);
         let photon = match i % 2 {
-            0 => found(ours[0].radius2, 0.3, 0.1),
+            0 => found(ours[0].squared, 0.3, 0.1),
             _ => found(pilot2, 0.3 + 0.4 * (i % 17) as f32 / 17.0, 0.1),
         };
         let mut tally = Default::default();
@@ -158,8 +159,8 @@ fn the_adaptive_rule_follows_its_sums() {
         let [distance2, ..] = photon.distance2.to_array();
         let [part, ..] = laplacian(f32x8::splat(distance2 / pilot2)).to_array();
         let scale = f64::from(pilot2).powi(-2);
-        let within = if f64::from(distance2) < radius2 { 1.0 } else { 0.0 };
-        shot = shot + Exact::new(within) / (Exact::new(PI) * Exact::new(radius2));
+        let within = if f64::from(distance2) < bandwidth2 { 1.0 } else { 0.0 };
+        shot = shot + Exact::new(within) / (Exact::new(PI) * Exact::new(bandwidth2));
         let part = Exact::new(f64::from(part)) * Exact::new(scale);
         (curvature, noise) = (curvature + part, noise + part * part);
         pilot2 = (4.0 * initial * ((i + 1) as f64).powf(-0.2)) as f32;
@@ -168,10 +169,10 @@ fn the_adaptive_rule_follows_its_sums() {
     let squared = (curvature * curvature - noise).value() / (n * n);
     let bias2 = f64::from(Kernel::Box.second_moment()).powi(2) * squared;
     let optimum = 2.0 * shot.value() / n * f64::from(Kernel::Box.roughness()) / (3.0 * PI * n * bias2);
-    let usual = memoryless::radius2_factor(MILLION + 1, 2.0 / 3.0);
+    let usual = memoryless::bandwidth2_factor(MILLION + 1, 2.0 / 3.0);
     let expected = optimum.cbrt().clamp(usual / 64.0, 4.0 * usual);
-    let error = (f64::from(ours[0].radius2) / expected - 1.0).abs();
-    println!("radius squared {:e} off by {error:.1e}; the memoryless rule's is {usual:e}", ours[0].radius2);
+    let error = (f64::from(ours[0].squared) / expected - 1.0).abs();
+    println!("radius squared {:e} off by {error:.1e}; the memoryless rule's is {usual:e}", ours[0].squared);
     assert!(error < 1e-5, "{error:e}");
     assert!(optimum.cbrt() > usual / 64.0 && optimum.cbrt() < 4.0 * usual, "a bound, not sums, sets the bandwidth");
 }
@@ -192,6 +193,6 @@ fn statistics_of_empty_sectors_are_numbers() {
         let rule = ChiSquared::new(&settings);
         let (mut bandwidth, mut counts) = ([rule.initial(1.0, 0.0, 0)], vec![0u32; rule.counts()]);
         rule.update(1, &mut bandwidth, &mut counts, &mut Default::default());
-        assert_eq!((bandwidth[0].radius2, bandwidth[0].bound), (1.0, MIN_BOUND));
+        assert_eq!((bandwidth[0].squared, bandwidth[0].bound), (1.0, MIN_BOUND));
     }
 }
