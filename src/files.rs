@@ -1,11 +1,11 @@
 //! Files that users or scenes name: read without waiting for pipes and devices, and recognised under all their names.
-//!
-//! What depends on the operating system stands in its module `system`.
 
 use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+
+use crate::system::{self, FileId};
 
 /// Maximum length of a chain of symbolic links, as on Linux.
 const MAX_LINKS: usize = 40;
@@ -63,17 +63,16 @@ pub fn is_same(one: &Path, other: &Path) -> bool {
 
 /// Whether two paths name the same existing folder.
 pub fn is_same_folder(one: &Path, other: &Path) -> bool {
-    let identity = |path: &Path| fs::metadata(path).ok().and_then(|data| system::identity(path, &data));
-    identity(one).is_some_and(|one| Some(one) == identity(other))
+    system::file_id(one).is_ok_and(|one| system::file_id(other).is_ok_and(|other| one == other))
 }
 
 /// A property that only one file has.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Key {
     /// The file itself, which hard links share.
-    File(system::Identity),
+    File(FileId),
     /// Its folder, and its name there. A file that is replaced keeps it.
-    Place(system::Identity, OsString),
+    Place(FileId, OsString),
 }
 
 /// A path with the keys of its file.
@@ -87,12 +86,11 @@ pub struct Identities<'a> {
 /// The keys of the file that a path names, existing or not. Devices and folders have none: they are not replaced.
 pub fn identities(path: &Path) -> Identities<'_> {
     let mut keys = Vec::new();
-    let found = fs::metadata(path);
-    if !found.as_ref().is_ok_and(|data| !data.is_file()) {
-        keys.extend(found.ok().and_then(|data| system::identity(path, &data)).map(Key::File));
+    if !fs::metadata(path).is_ok_and(|data| !data.is_file()) {
+        keys.extend(system::file_id(path).ok().map(Key::File));
         let target = follow(path).unwrap_or_else(|| path.to_owned());
-        let place = fs::metadata(folder(&target)).ok().and_then(|data| system::identity(folder(&target), &data));
-        keys.extend(place.zip(target.file_name()).map(|(folder, name)| Key::Place(folder, name.to_owned())));
+        let place = system::file_id(folder(&target));
+        keys.extend(place.ok().zip(target.file_name()).map(|(folder, name)| Key::Place(folder, name.to_owned())));
     }
     Identities { path, keys }
 }
@@ -112,51 +110,6 @@ pub fn follow(path: &Path) -> Option<PathBuf> {
 /// The folder of a file.
 pub fn folder(path: &Path) -> &Path {
     path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-#[cfg(unix)]
-mod system {
-    use std::fs::{File, Metadata};
-    use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt};
-    use std::path::Path;
-
-    /// Device and number of a file.
-    pub type Identity = (u64, u64);
-
-    pub fn identity(_: &Path, data: &Metadata) -> Option<Identity> {
-        Some((data.dev(), data.ino()))
-    }
-
-    pub fn is_pipe(data: &Metadata) -> bool {
-        data.file_type().is_fifo()
-    }
-
-    /// Opens a file; a pipe without a writer is opened at once.
-    pub fn open_without_waiting(path: &Path) -> std::io::Result<File> {
-        let flags = rustix::fs::OFlags::NONBLOCK | rustix::fs::OFlags::NOCTTY;
-        File::options().read(true).custom_flags(flags.bits() as i32).open(path)
-    }
-}
-
-#[cfg(not(unix))]
-mod system {
-    use std::fs::{File, Metadata};
-    use std::path::{Path, PathBuf};
-
-    /// Canonical path of a file.
-    pub type Identity = PathBuf;
-
-    pub fn identity(path: &Path, _: &Metadata) -> Option<Identity> {
-        path.canonicalize().ok()
-    }
-
-    pub fn is_pipe(_: &Metadata) -> bool {
-        false
-    }
-
-    pub fn open_without_waiting(path: &Path) -> std::io::Result<File> {
-        File::open(path)
-    }
 }
 
 #[cfg(test)]

@@ -6,11 +6,12 @@
 //! the Python package. The current folder is never searched: it may hold files of other users, and what is found is
 //! run.
 
-use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use caustique_library::Folders;
 pub use caustique_library::path_from_env;
+
+use crate::system;
 
 /// Environment variable that names the project's folder, the parent of `scripts`. If set, no other folder is searched.
 pub const HOME_VARIABLE: &str = "CAUSTIQUE_HOME";
@@ -18,9 +19,6 @@ pub const HOME_VARIABLE: &str = "CAUSTIQUE_HOME";
 /// Folder of a package's libraries, relative to the folder of the program or of the Python module, or to the folder
 /// above it.
 const PACKAGE: &str = "lib/caustique";
-
-/// Mode bit of folders where everybody may create files, such as `/tmp`.
-const STICKY_BIT: u32 = 0o1000;
 
 /// The paths to try for something installed at `relative` in the project's folder, nearest folder first.
 pub fn candidates(relative: &str) -> Vec<PathBuf> {
@@ -61,7 +59,12 @@ fn package_folders() -> Vec<PathBuf> {
 
 /// Where the libraries are if `file` is the program or the module of a package.
 fn packages_of(file: &Path) -> Vec<PathBuf> {
-    file.ancestors().skip(1).take(2).filter(|folder| !is_shared(folder)).map(|folder| folder.join(PACKAGE)).collect()
+    file.ancestors()
+        .skip(1)
+        .take(2)
+        .filter(|folder| !system::is_shared(folder))
+        .map(|folder| folder.join(PACKAGE))
+        .collect()
 }
 
 /// The folders that may be the project's, nearest first.
@@ -74,24 +77,13 @@ fn project_folders() -> Vec<PathBuf> {
 
 /// The folders above `file`, nearest first, except folders where everybody may create files.
 fn folders_above(file: &Path) -> Vec<PathBuf> {
-    file.ancestors().skip(1).filter(|folder| !is_shared(folder)).map(Path::to_path_buf).collect()
-}
-
-/// Whether everybody may create files in `folder`.
-fn is_shared(folder: &Path) -> bool {
-    folder.metadata().is_ok_and(|data| data.mode() & STICKY_BIT != 0)
+    file.ancestors().skip(1).filter(|folder| !system::is_shared(folder)).map(Path::to_path_buf).collect()
 }
 
 /// The file that contains this code: the program or the Python module.
 fn own_file() -> Option<PathBuf> {
     let address = own_file as fn() -> Option<PathBuf> as usize;
-    let path_if_mapped = |line: &str| {
-        let (from, to) = line.split_whitespace().next()?.split_once('-')?;
-        let [from, to] = [from, to].map(|digits| usize::from_str_radix(digits, 16).unwrap_or(0));
-        (from..to).contains(&address).then(|| line.find('/').map(|at| PathBuf::from(&line[at..])))?
-    };
-    let mapped = std::fs::read_to_string("/proc/self/maps").unwrap_or_default();
-    mapped.lines().find_map(path_if_mapped).or_else(|| std::env::current_exe().ok())
+    system::file_with_code(address).or_else(|| std::env::current_exe().ok())
 }
 
 #[cfg(test)]

@@ -28,6 +28,9 @@
 pub mod error;
 
 #[doc(hidden)]
+pub mod system;
+
+#[doc(hidden)]
 pub mod files;
 
 #[doc(hidden)]

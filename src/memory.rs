@@ -7,9 +7,8 @@
 //! leaves.
 
 use crate::error::{Error, ErrorKind, Result};
-use rustix::process::{Resource, getrlimit};
+use crate::system;
 use std::fmt::Display;
-use std::path::{Path, PathBuf};
 
 /// Allocations below this number of bytes are not checked against the free memory.
 pub const MIN_CHECKED_BYTES: u64 = 16 << 20;
@@ -28,18 +27,8 @@ pub struct Available {
 
 /// Free memory: the least that the machine, `ulimit -v` and the control groups leave. `None` if no limit can be read.
 pub fn available() -> Option<Available> {
-    let machine = || parse_kib(&std::fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable:");
-    let address_space = || {
-        let most = getrlimit(Resource::As).current?;
-        Some(most.saturating_sub(parse_kib(&std::fs::read_to_string("/proc/self/status").ok()?, "VmSize:")?))
-    };
-    let groups = || free_in_groups(&std::fs::read_to_string("/proc/self/cgroup").ok()?, Path::new("/sys/fs/cgroup"));
-    let limits = [
-        (machine(), "available"),
-        (address_space(), "left by 'ulimit -v'"),
-        (groups(), "left by the control group (a container's or a job's limit)"),
-    ];
-    let limits = limits.into_iter().filter_map(|(bytes, source)| Some(Available { bytes: bytes?, source }));
+    let limits =
+        system::memory_limits().into_iter().filter_map(|(bytes, source)| Some(Available { bytes: bytes?, source }));
     limits.min_by_key(|limit| limit.bytes)
 }
 
@@ -73,72 +62,9 @@ pub fn reserve<T>(count: usize, what: impl Display) -> Result<Vec<T>> {
     }
 }
 
-/// Parses a line of `/proc`, such as `MemAvailable:  123 kB`, and returns the bytes.
-fn parse_kib(text: &str, key: &str) -> Option<u64> {
-    let line = text.lines().find_map(|line| line.strip_prefix(key))?;
-    line.split_whitespace().next()?.parse::<u64>().ok()?.checked_mul(1024)
-}
-
-/// Bytes that the control groups leave. `text` is `/proc/self/cgroup` (version 2: `0::/path`; version 1:
-/// `9:memory:/path`), `root` the mount point. The limits of a group and of all its ancestors apply. In a container, the
-/// process's own group may be the root.
-fn free_in_groups(text: &str, root: &Path) -> Option<u64> {
-    let groups = text.lines().filter_map(|line| {
-        let mut fields = line.splitn(3, ':').skip(1);
-        let (controllers, path) = (fields.next()?, fields.next()?.trim_start_matches('/'));
-        match controllers {
-            "" => Some((root.to_owned(), path, ["memory.max", "memory.current", "inactive_file"])),
-            list if list.split(',').any(|name| name == "memory") => {
-                let names = ["memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"];
-                Some((root.join("memory"), path, names))
-            }
-            _ => None,
-        }
-    });
-    let left = groups.flat_map(|(mount, path, names)| {
-        let around: Vec<PathBuf> = Path::new(path).ancestors().map(|group| mount.join(group)).collect();
-        around.into_iter().filter_map(move |group| free_in_group(&group, names))
-    });
-    left.min()
-}
-
-/// The limit of a group minus the memory in use. Pages of inactive files are reclaimable and do not count as used.
-fn free_in_group(group: &Path, [limit, usage, files]: [&str; 3]) -> Option<u64> {
-    let number = |name: &str| std::fs::read_to_string(group.join(name)).ok()?.trim().parse::<u64>().ok();
-    let (limit, usage) = (number(limit)?, number(usage)?);
-    let stat = std::fs::read_to_string(group.join("memory.stat")).unwrap_or_default();
-    let files = stat.lines().find_map(|line| line.strip_prefix(files)?.trim().parse().ok());
-    Some(limit.saturating_sub(usage.saturating_sub(files.unwrap_or(0))))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_smallest_limit_of_all_groups_applies() {
-        let root = tempfile::tempdir().expect("a folder");
-        let write = |path: &str, text: &str| {
-            let path = root.path().join(path);
-            std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
-            std::fs::write(path, text).expect("it can be written");
-        };
-        let left = |text: &str| free_in_groups(text, root.path());
-        assert_eq!(left("0::/jobs/7\n"), None);
-        write("jobs/7/memory.max", "max\n");
-        write("jobs/7/memory.current", "900\n");
-        assert_eq!(left("0::/jobs/7\n"), None);
-        write("jobs/memory.max", "5000\n");
-        write("jobs/memory.current", "1700\n");
-        write("jobs/memory.stat", "anon 900\ninactive_file 300\nactive_file 500\n");
-        assert_eq!(left("0::/jobs/7\n"), Some(3600));
-        write("jobs/7/memory.max", "1000\n");
-        assert_eq!(left("0::/jobs/7\n"), Some(100));
-        // Version 1, in a container that sees its own group as the root.
-        write("memory/memory.limit_in_bytes", "4096\n");
-        write("memory/memory.usage_in_bytes", "96\n");
-        assert_eq!(left("4:cpu,cpuacct:/x\n3:memory:/docker/abc\n"), Some(4000));
-    }
 
     #[test]
     fn errors_name_the_amount_that_does_not_fit() {

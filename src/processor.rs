@@ -1,9 +1,9 @@
 //! Checks that the processor has the instructions that the program was built with, and prefetches memory.
 //!
-//! `.cargo/config.toml` builds for x86-64-v3. The check reads `flags` in `/proc/cpuinfo`, because
-//! `is_x86_feature_detected!` is always true for a feature that is enabled at build time.
+//! `.cargo/config.toml` builds for x86-64-v3. The check asks the system, because `is_x86_feature_detected!` is always true for a feature that is enabled at build time.
 
 use crate::error::{Error, ErrorKind, Result};
+use crate::system;
 
 /// Features of x86-64-v3 by their names in `/proc/cpuinfo`.
 const REQUIRED_FEATURES: [&str; 5] = ["avx2", "bmi2", "f16c", "fma", "movbe"];
@@ -23,10 +23,10 @@ pub fn prefetch<T>(values: impl IntoIterator<Item = T>) {
 /// # Errors
 /// An instruction is missing.
 pub fn check() -> Result<()> {
-    if !cfg!(all(target_arch = "x86_64", target_os = "linux", target_feature = "avx2")) {
+    if !cfg!(target_feature = "avx2") {
         return Ok(());
     }
-    let missing = std::fs::read_to_string("/proc/cpuinfo").map(|text| missing_features(&text)).unwrap_or_default();
+    let missing = system::processor_features().map(|features| missing_features(&features)).unwrap_or_default();
     if missing.is_empty() {
         return Ok(());
     }
@@ -35,12 +35,9 @@ pub fn check() -> Result<()> {
         .hint("use a processor made since 2013, or build from source without the flags in .cargo/config.toml"))
 }
 
-/// Required processor features that the first processor in the text `cpuinfo` does not list. Empty if it has no list of
-/// features.
-fn missing_features(cpuinfo: &str) -> Vec<&'static str> {
-    let flags = cpuinfo.lines().find_map(|line| line.strip_prefix("flags")?.split_once(':'));
-    let Some((_, flags)) = flags else { return Vec::new() };
-    REQUIRED_FEATURES.into_iter().filter(|name| !flags.split_whitespace().any(|flag| flag == *name)).collect()
+/// Required processor features that are not among `features`.
+fn missing_features(features: &[String]) -> Vec<&'static str> {
+    REQUIRED_FEATURES.into_iter().filter(|name| !features.iter().any(|feature| feature == name)).collect()
 }
 
 #[cfg(test)]
@@ -49,8 +46,8 @@ mod tests {
 
     #[test]
     fn missing_features_are_named() {
-        let modern = "processor\t: 0\nflags\t\t: fpu avx2 bmi2 f16c fma movbe sse2\nbogomips\t: 1\n";
-        assert!(missing_features(modern).is_empty() && missing_features("no such line").is_empty());
-        assert_eq!(missing_features("flags\t\t: fpu sse2 avx f16c movbe"), ["avx2", "bmi2", "fma"]);
+        let missing = |features: &str| missing_features(&features.split(' ').map(String::from).collect::<Vec<_>>());
+        assert_eq!(missing("fpu avx2 bmi2 f16c fma movbe sse2"), [] as [&str; 0]);
+        assert_eq!(missing("fpu sse2 avx f16c movbe"), ["avx2", "bmi2", "fma"]);
     }
 }

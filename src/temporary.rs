@@ -1,8 +1,7 @@
 //! Temporary folders.
 
 use crate::error::{Error, Result};
-use std::fs::Permissions;
-use std::os::unix::fs::PermissionsExt;
+use crate::system;
 use tempfile::TempDir;
 
 /// Creates a temporary folder whose name begins with `prefix`. Dropping the result deletes it. Only the user has
@@ -11,13 +10,17 @@ use tempfile::TempDir;
 /// # Errors
 /// The folder cannot be created.
 pub fn create_folder(prefix: &str) -> Result<TempDir> {
-    let folder = tempfile::Builder::new().prefix(prefix).permissions(Permissions::from_mode(0o700)).tempdir();
-    folder.map_err(|cause| Error::io(&std::env::temp_dir(), &cause))
+    let mut builder = tempfile::Builder::new();
+    if let Some(permissions) = system::private_permissions() {
+        builder.permissions(permissions);
+    }
+    builder.prefix(prefix).tempdir().map_err(|cause| Error::io(&std::env::temp_dir(), &cause))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::os::unix::fs::PermissionsExt;
 
     #[test]
     fn only_the_user_has_access_to_a_temporary_folder() {

@@ -343,3 +343,33 @@ fn the_scan_for_methods_finds_planted_faults() {
         "// Method::Pm\nlet all = Method::ALL; let other = Method::Pmx;\n#[cfg(test)]\nmod tests { Method::Pm }";
     assert_eq!(named_methods(allowed), [] as [&str; 0]);
 }
+
+/// The questions about the operating system in shipped lines of a file.
+fn system_questions(text: &str) -> Vec<&'static str> {
+    let words =
+        ["cfg(unix", "cfg(windows", "not(unix", "not(windows", "target_os", "target_family", "os::unix", "os::windows"];
+    let words = words.into_iter().chain(["os::linux", "os::fd", "\"/proc", "\"/sys", "rustix::", "signal_hook"]);
+    let code = shipped(text);
+    words.filter(|word| code.contains(word)).collect()
+}
+
+/// Only `src/system` asks on which system the program runs.
+#[test]
+fn only_the_system_module_depends_on_the_operating_system() {
+    let mut faults = Vec::new();
+    for file in files("src") {
+        let path = file.to_string_lossy().replace('\\', "/");
+        let found = system_questions(&fs::read_to_string(&file).expect("it can be read"));
+        if !found.is_empty() && !path.contains("/src/system/") {
+            faults.push(format!("{path}: {}", found.join(", ")));
+        }
+    }
+    assert!(faults.is_empty(), "move it to src/system:\n{}", faults.join("\n"));
+}
+
+#[test]
+fn the_scan_for_systems_finds_planted_faults() {
+    assert_eq!(system_questions("#[cfg(windows)]\nuse std::os::windows::fs::X;"), ["cfg(windows", "os::windows"]);
+    assert_eq!(system_questions("fs::read(\"/proc/cpuinfo\")"), ["\"/proc"]);
+    assert_eq!(system_questions("// /proc\n#[cfg(test)]\nmod tests { use std::os::unix; }"), [] as [&str; 0]);
+}

@@ -8,11 +8,9 @@
 use caustique::error::{Error, Result};
 use caustique::files;
 use caustique::image::atomic;
-use rustix::io::Errno;
-use rustix::process::{Pid, test_kill_process};
+use caustique::system::{self, machine};
 use std::fs::{self, File};
-use std::io::{self, Read, Write};
-use std::os::unix::fs::{FileExt, MetadataExt};
+use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
@@ -119,10 +117,12 @@ impl Drop for Claim {
 }
 
 /// Sets the modification time of a file to the server's current time by rewriting its first byte.
-fn touch(file: &File) -> io::Result<()> {
+fn touch(mut file: &File) -> io::Result<()> {
     let mut first = [0];
-    file.read_exact_at(&mut first, 0)?;
-    file.write_all_at(&first, 0)?;
+    file.rewind()?;
+    file.read_exact(&mut first)?;
+    file.rewind()?;
+    file.write_all(&first)?;
     file.sync_all()
 }
 
@@ -156,18 +156,9 @@ fn is_dead(holder: &str, age: Duration) -> bool {
     age > MAX_AGE || lines.next().filter(|_| of_here).is_some_and(is_gone)
 }
 
-/// Whether no process has this number, or one that has ended. A process that may not be signalled exists, although `/proc`
-/// may hide it.
+/// Whether no process has this number, or one that has ended.
 fn is_gone(process: &str) -> bool {
-    let process = process.parse().ok().filter(|process| *process > 0).and_then(Pid::from_raw);
-    process.is_some_and(|process| test_kill_process(process) == Err(Errno::SRCH) || is_zombie(process))
-}
-
-/// Whether a process has ended, and its parent has not asked for its exit code yet.
-fn is_zombie(process: Pid) -> bool {
-    let stat = fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
-    // The state follows the name, which is in brackets and may contain some.
-    stat.rsplit_once(')').is_some_and(|(_, state)| state.trim_start().starts_with(['Z', 'X']))
+    process.parse().is_ok_and(system::is_process_gone)
 }
 
 /// Whether a file holds the text of [`owner`], or nothing yet.
@@ -190,9 +181,9 @@ pub fn remove_dead(output: &Path) {
 fn remove(path: &Path, touched: SystemTime) -> io::Result<()> {
     let removed = || {
         let file = File::open(path)?;
-        let _ = file.lock();
-        let [own, there] = [file.metadata()?, fs::metadata(path)?];
-        let same = (own.dev(), own.ino(), own.modified()?) == (there.dev(), there.ino(), touched);
+        let _ = system::lock(&file);
+        let [own, there] = [system::open_file_id(&file)?, system::file_id(path)?];
+        let same = own == there && file.metadata()?.modified()? == touched;
         if same { fs::remove_file(path) } else { Ok(()) }
     };
     match removed() {
@@ -206,19 +197,7 @@ fn remove(path: &Path, touched: SystemTime) -> io::Result<()> {
 fn owner() -> String {
     let process = std::process::id();
     let moment = SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default().as_nanos();
-    format!("{}, process {process}\n{}\n{process}\n{moment}\n", host(), machine())
-}
-
-/// Identifies the machine since its start, and the namespace of its process numbers, which containers have separately.
-fn machine() -> String {
-    let boot = fs::read_to_string("/proc/sys/kernel/random/boot_id").unwrap_or_default();
-    let namespace = fs::read_link("/proc/self/ns/pid").unwrap_or_default();
-    format!("{} {} {}", host(), boot.trim(), namespace.display())
-}
-
-/// Name of this machine.
-fn host() -> String {
-    fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default().trim().to_owned()
+    format!("{}, process {process}\n{}\n{process}\n{moment}\n", system::host(), machine())
 }
 
 #[cfg(test)]
@@ -277,19 +256,6 @@ mod tests {
     fn processes_of_others_are_alive() {
         let own = std::process::id().to_string();
         assert_eq!(["1", &own, "0", "-1", "x", "4194999"].map(is_gone), [false, false, false, false, false, true]);
-    }
-
-    /// A process that was killed, and whose parent has not noticed, is dead.
-    #[test]
-    fn zombies_are_dead() {
-        let mut child = std::process::Command::new("sleep").arg("60").spawn().expect("it starts");
-        let id = child.id().to_string();
-        assert!(!is_gone(&id));
-        child.kill().expect("it can be killed");
-        while !is_gone(&id) {
-            std::thread::yield_now();
-        }
-        child.wait().expect("it has ended");
     }
 
     /// A file that is no claim stays, however old it is.

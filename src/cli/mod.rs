@@ -25,13 +25,12 @@ mod usage;
 mod warnings;
 
 use caustique::error::{Error, ErrorKind, Result};
-use caustique::processor;
+use caustique::{processor, system};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::ffi::OsString;
 use std::fs::File;
 use std::io::Write;
 use std::num::NonZero;
-use std::os::fd::AsFd;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -89,7 +88,7 @@ fn named_command(line: &clap::Command) -> Option<&clap::Command> {
 /// Runs the program and returns its exit code.
 pub fn main() -> ExitCode {
     events::use_if_asked(std::env::args_os());
-    if let Err(error) = processor::check().and_then(|()| signals::survive_large_files()) {
+    if let Err(error) = processor::check().and_then(|()| system::survive_large_files().map_err(signals::failed)) {
         return fail(&error);
     }
     let mut line = command_line();
@@ -216,8 +215,7 @@ fn print(text: &str) -> Result<()> {
 
 /// Copies a file to stdout.
 fn print_file(path: &Path) -> std::io::Result<()> {
-    let mut out = File::from(std::io::stdout().as_fd().try_clone_to_owned()?);
-    std::io::copy(&mut File::open(path)?, &mut out).map(drop)
+    std::io::copy(&mut File::open(path)?, &mut system::stdout_file()?).map(drop)
 }
 
 /// Prints an indented JSON object to stdout.

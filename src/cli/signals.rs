@@ -4,8 +4,7 @@
 use super::say;
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::stop::Stop;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
-use signal_hook::iterator::Signals;
+use caustique::system;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -31,21 +30,8 @@ impl Interrupt {
         if let Some(interrupt) = INSTALLED.get() {
             return Ok(interrupt.clone());
         }
-        let failed = |error| Error::new(ErrorKind::Io, "signals", error);
         let flag = Arc::new(AtomicBool::new(false));
-        for signal in [SIGINT, SIGTERM, SIGHUP] {
-            // In this order: a signal ends the program if the flag is set already, and else sets the flag.
-            signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&flag))
-                .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&flag)))
-                .map_err(failed)?;
-        }
-        let mut pressed = Signals::new([SIGINT]).map_err(failed)?;
-        let answer = move || {
-            if pressed.forever().next().is_some() {
-                say("stopping; press again to stop now");
-            }
-        };
-        std::thread::Builder::new().spawn(answer).map_err(failed)?;
+        system::on_interrupt(&flag, || say("stopping; press again to stop now")).map_err(failed)?;
         Ok(INSTALLED.get_or_init(|| Interrupt(flag)).clone())
     }
 
@@ -77,11 +63,7 @@ impl Interrupt {
     }
 }
 
-/// Catches SIGXFSZ, so that a file that grows past `ulimit -f` fails to be written instead of ending the program.
-///
-/// # Errors
-/// The handler cannot be installed.
-pub fn survive_large_files() -> Result<()> {
-    let noted = Arc::new(AtomicBool::new(false));
-    signal_hook::flag::register(SIGXFSZ, noted).map(drop).map_err(|error| Error::new(ErrorKind::Io, "signals", error))
+/// The error about a handler that cannot be installed.
+pub fn failed(cause: std::io::Error) -> Error {
+    Error::new(ErrorKind::Io, "signals", cause)
 }

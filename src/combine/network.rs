@@ -6,9 +6,10 @@ use ort::value::{Outlet, TensorRef, ValueType};
 
 use super::model::{Metadata, Model, WeightForm};
 use super::output::{NetworkOutput, Rect};
-use super::runtime::{Runtime, SilencedStderr};
+use super::runtime::Runtime;
 use super::tensor;
 use crate::error::{Error, ErrorKind, Result};
+use crate::system::SilencedStderr;
 
 /// The network's weights for equation (6) over one tile, in one of two forms.
 #[derive(Debug)]
@@ -82,7 +83,7 @@ fn open(model: &Model, runtime: &Runtime, threads: usize) -> ort::Result<Session
         .with_intra_threads(threads)?
         // Idle inference threads must not spin while equation (6) needs the cores.
         .with_intra_op_spinning(false)?;
-    let _quiet = SilencedStderr::new();
+    let _quiet = SilencedStderr::start();
     builder.commit_from_memory(&model.bytes)
 }
 

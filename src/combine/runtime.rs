@@ -1,27 +1,23 @@
 //! Finds and loads ONNX Runtime, once per process.
 //!
 //! If the environment variable `CAUSTIQUE_ONNXRUNTIME` is set, only the file that it names is tried. Otherwise any
-//! `libonnxruntime.so*` of the package that holds this code is tried, then the library's common names for the system's
+//! `libonnxruntime.so*` (on Linux) of the package that holds this code is tried, then the library's common names for the system's
 //! loader, then any such file below `.deps/onnxruntime/`, where `scripts/setup.sh` installs it (see [`installed`]).
 
-use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use caustique_library::file_name;
+use caustique_library::file_containing;
 use ort::environment::Environment;
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::installed;
+use crate::system::{self, ONNXRUNTIME};
 
 /// Environment variable that names the file of ONNX Runtime's library.
 pub const VARIABLE: &str = "CAUSTIQUE_ONNXRUNTIME";
 
-/// Prefix of the file names of ONNX Runtime's library.
-const NAME: &str = "libonnxruntime.so";
-
-/// Minor versions of ONNX Runtime whose file names are tried (Debian 13 installs libonnxruntime.so.1.21). The first is
-/// the oldest that `ort` supports here.
+/// Minor versions of ONNX Runtime whose file names are tried. The first is the oldest that `ort` supports here.
 const MINOR_VERSIONS: std::ops::RangeInclusive<u32> = 17..=49;
 
 /// Folder within the project into which `scripts/setup.sh` installs ONNX Runtime.
@@ -88,15 +84,15 @@ fn candidates(named: Option<PathBuf>) -> Result<Vec<PathBuf>> {
         }
         return Ok(vec![absolute]);
     }
-    let versioned = MINOR_VERSIONS.rev().map(|minor| format!("{NAME}.1.{minor}"));
-    let names = [NAME.into(), format!("{NAME}.1")].into_iter().chain(versioned);
-    Ok(installed::folders(FOLDER).candidates(NAME, names))
+    let names = system::onnxruntime_names(MINOR_VERSIONS.rev());
+    Ok(installed::folders(FOLDER).candidates(ONNXRUNTIME, names))
 }
 
 /// Loads the first of the candidate paths that is a supported version of ONNX Runtime.
 fn load(candidates: &[PathBuf]) -> Result<Runtime> {
     let mut refusals = Vec::new();
     for candidate in candidates {
+        system::preload(candidate);
         // `init_from` returns errors; loading through ORT_DYLIB_PATH panics.
         match ort::init_from(candidate) {
             Ok(builder) => {
@@ -117,39 +113,14 @@ fn load(candidates: &[PathBuf]) -> Result<Runtime> {
     Err(Error::new(ErrorKind::Library, "ONNX Runtime", cause).hint(HINT))
 }
 
-/// Redirects stderr to `/dev/null` until it is dropped. Debian 13's ONNX Runtime is linked to a libonnx that has already
-/// registered all operators, and prints some 500 lines about them past its own logger when the first session starts.
-/// Errors are still returned as values.
-pub(super) struct SilencedStderr(Option<OwnedFd>);
-
-impl SilencedStderr {
-    pub fn new() -> SilencedStderr {
-        let nowhere = std::fs::OpenOptions::new().write(true).open("/dev/null");
-        let saved = rustix::io::fcntl_dupfd_cloexec(rustix::stdio::stderr(), 3);
-        let (Ok(nowhere), Ok(saved)) = (nowhere, saved) else { return SilencedStderr(None) };
-        SilencedStderr(rustix::stdio::dup2_stderr(nowhere).is_ok().then_some(saved))
-    }
-}
-
-impl Drop for SilencedStderr {
-    fn drop(&mut self) {
-        if let Some(saved) = self.0.take() {
-            // A failure cannot be reported: stderr is gone.
-            let _ = rustix::stdio::dup2_stderr(saved);
-        }
-    }
-}
-
-/// The path of the library that was loaded as `candidate`; for a name without a folder, the file that this process has
-/// mapped.
+/// The path of the library that was loaded as `candidate`; for a name without a folder, the file that the system's
+/// loader has found.
 fn loaded_file(candidate: &Path) -> PathBuf {
     if candidate.is_absolute() {
         return candidate.canonicalize().unwrap_or_else(|_| candidate.to_path_buf());
     }
-    let maps = std::fs::read_to_string("/proc/self/maps").unwrap_or_default();
-    let mapped =
-        maps.lines().filter_map(|line| line.split_once('/')).map(|(_, path)| PathBuf::from(format!("/{path}")));
-    let found = mapped.into_iter().find(|path| file_name(path).starts_with(NAME));
+    // The functions of the library are in a table of its own.
+    let found = file_containing(std::ptr::from_ref(ort::api()) as usize).and_then(|path| path.canonicalize().ok());
     found.unwrap_or_else(|| candidate.to_path_buf())
 }
 

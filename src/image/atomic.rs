@@ -1,7 +1,7 @@
 //! Atomic file writes: a file is either complete or absent.
 
 use std::ffi::{OsStr, OsString};
-use std::fs::{self, File, Permissions};
+use std::fs::{self, File};
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 
@@ -9,6 +9,7 @@ use tempfile::NamedTempFile;
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::files::{self, folder};
+use crate::system;
 
 /// Writes a file through `fill` to a temporary file beside it, flushes that to disk and renames it, so that no reader
 /// sees a partial file. On failure the temporary file is removed and an older file at `path` stays unchanged.
@@ -97,7 +98,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
     let target = resolve(path)?;
     match fs::symlink_metadata(&target) {
         Err(cause) if cause.kind() != io::ErrorKind::NotFound => return Err(failure(path, &cause)),
-        Ok(file) if is_protected(&target, &file) => {
+        Ok(file) if system::is_protected(&file, folder(&target)) => {
             let error =
                 Error::new(ErrorKind::Io, path.display(), "belongs to another user, whose files are kept there");
             return Err(error.hint("choose another name, or another folder"));
@@ -105,23 +106,6 @@ pub fn check_writable(path: &Path) -> Result<()> {
         _ => {}
     }
     temporary_beside(&target).map(drop).map_err(|cause| failure(path, &cause))
-}
-
-/// Whether the folder of the file `target`, such as `/tmp`, allows only the owner to replace the file, and the owner is
-/// another user.
-#[cfg(unix)]
-fn is_protected(target: &Path, file: &fs::Metadata) -> bool {
-    use std::os::unix::fs::MetadataExt;
-    /// The sticky bit of a folder's mode.
-    const STICKY: u32 = 0o1000;
-    let user = rustix::process::geteuid().as_raw();
-    let folder = fs::metadata(folder(target));
-    folder.is_ok_and(|folder| folder.mode() & STICKY != 0 && ![0, file.uid(), folder.uid()].contains(&user))
-}
-
-#[cfg(not(unix))]
-fn is_protected(_: &Path, _: &fs::Metadata) -> bool {
-    false
 }
 
 /// An error of the file system while writing `path`, with a remedy if there is one.
@@ -169,15 +153,16 @@ fn temporary_beside(target: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(&prefix).suffix(PART);
     // Temporary files are private by default; ours becomes the user's file, under the user's umask.
-    #[cfg(unix)]
-    builder.permissions(<Permissions as std::os::unix::fs::PermissionsExt>::from_mode(0o666));
+    if let Some(permissions) = system::user_permissions() {
+        builder.permissions(permissions);
+    }
     if is_device(target) {
         return builder.tempfile();
     }
     loop {
         let file = builder.tempfile_in(folder(target))?;
         // The lock marks a file that is being written. Another process may have removed the file before it was locked.
-        let locked = file.as_file().lock().is_ok();
+        let locked = system::lock(file.as_file()).is_ok();
         if !locked || file.path().exists() {
             return Ok(file);
         }
@@ -218,7 +203,7 @@ fn remove_stale(folder: &Path, prefix: &OsStr, suffix: &str) {
     let is_file = |entry: &fs::DirEntry| entry.file_type().is_ok_and(|kind| kind.is_file());
     for entry in entries.filter(|entry| is_ours(&entry.file_name(), prefix, suffix) && is_file(entry)) {
         // Holding the lock keeps writers out until the file is removed.
-        let free = File::open(entry.path()).ok().filter(|file| file.try_lock().is_ok());
+        let free = File::open(entry.path()).ok().filter(|file| system::try_lock(file).is_ok());
         if free.is_some() {
             let _ = fs::remove_file(entry.path());
         }
@@ -305,7 +290,7 @@ mod tests {
             fs::write(path(name), "half").expect("it can be written");
         }
         let writer = File::open(path(busy)).expect("it is there");
-        writer.lock().expect("it can be locked");
+        system::lock(&writer).expect("it can be locked");
         write_bytes(&path("a.exr"), b"whole").expect("it can be written");
         assert_eq!(fs::read(path("a.exr")).expect("it is there"), b"whole");
         assert!(!path(stale).exists() && path(busy).exists() && others.iter().all(|name| path(name).exists()));

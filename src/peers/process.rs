@@ -1,11 +1,10 @@
 //! Runs a program that can exceed a time limit or be stopped by the user.
 
 use crate::render::Clock;
-use rustix::process::{Pid, Signal, kill_process_group};
+use crate::system::Group;
 use std::fs::File;
 use std::io::{Read, Seek};
-use std::os::unix::process::CommandExt;
-use std::process::{Child, Command, ExitStatus};
+use std::process::{Command, ExitStatus};
 use std::time::Duration;
 
 /// A callback that returns true when the program must stop; called repeatedly while the program runs.
@@ -24,19 +23,6 @@ pub(super) enum End {
     Stopped,
 }
 
-/// Kills the process group of a program, and so its children, when dropped.
-struct Group(Child);
-
-impl Drop for Group {
-    fn drop(&mut self) {
-        if let Some(group) = i32::try_from(self.0.id()).ok().and_then(Pid::from_raw) {
-            // An error means that all processes have ended.
-            let _ = kill_process_group(group, Signal::KILL);
-        }
-        let _ = self.0.wait();
-    }
-}
-
 /// Runs a program for at most `limit` seconds. It has its own process group, so that Ctrl-C in a terminal reaches only
 /// caustique, which then stops the program.
 ///
@@ -46,10 +32,10 @@ pub(super) fn run(mut command: Command, limit: f64, stop: Stop<'_>) -> std::io::
     // Files, because pipes that are not read fill up.
     let mut outputs: [File; 2] = [tempfile::tempfile()?, tempfile::tempfile()?];
     command.stdin(std::process::Stdio::null()).stdout(outputs[0].try_clone()?).stderr(outputs[1].try_clone()?);
-    let mut child = Group(command.process_group(0).spawn()?);
+    let mut child = Group::start(&mut command)?;
     let clock = Clock::start();
     loop {
-        if let Some(status) = child.0.try_wait()? {
+        if let Some(status) = child.try_wait()? {
             let mut texts = [const { String::new() }; 2];
             for (file, text) in outputs.iter_mut().zip(&mut texts) {
                 let mut bytes = Vec::new();

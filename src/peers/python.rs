@@ -3,6 +3,7 @@
 use super::Renderer;
 use crate::error::{Error, ErrorKind, Result};
 use crate::installed;
+use crate::system;
 use std::path::PathBuf;
 use std::process::Command;
 
@@ -45,7 +46,7 @@ impl Interpreter {
                 let error = Error::new(ErrorKind::Library, format!("{variable}={}", path.display()), "no such file");
                 return Err(error.hint(format!("name a Python that has {module}, or unset it and {HINT}")));
             }
-            None => installed::find(&format!("{environment}/bin/python")).ok_or_else(|| {
+            None => installed::find(&format!("{environment}/{}", system::PYTHON_OF_ENVIRONMENT)).ok_or_else(|| {
                 Error::new(ErrorKind::Library, format!("--with: {environment}"), "there is no such environment")
                     .hint(format!("{HINT}, or set {variable} to a Python that has {module}"))
             })?,

@@ -1,7 +1,7 @@
 //! Clocks and memory of the process. Only this module and [`crate::stop`] read clocks, which decide only when a render
 //! stops.
 
-use rustix::time::{ClockId, clock_gettime};
+pub use crate::system::{cpu_seconds, peak_memory};
 use serde::{Deserialize, Serialize};
 
 /// A stopwatch.
@@ -19,23 +19,6 @@ impl Clock {
     pub fn seconds(&self) -> f64 {
         self.0.elapsed().as_secs_f64()
     }
-}
-
-/// Processor time that the process has taken since it began (seconds).
-pub fn cpu_seconds() -> f64 {
-    let time = clock_gettime(ClockId::ProcessCPUTime);
-    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
-}
-
-/// Peak resident memory of the process (bytes), from `/proc`; 0 on systems without `/proc`.
-pub fn peak_memory() -> u64 {
-    let read = || -> Option<u64> {
-        let status = std::fs::read_to_string("/proc/self/status").ok()?;
-        let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
-        let kib: u64 = line.split_whitespace().next()?.parse().ok()?;
-        Some(kib * 1024)
-    };
-    read().unwrap_or(0)
 }
 
 /// Time spent on a render, without the time between its iterations.

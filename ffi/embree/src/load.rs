@@ -25,8 +25,8 @@ const NAMES: &[&str] = &[
 #[cfg(windows)]
 const NAMES: &[&str] = &["embree4.dll", "embree3.dll"];
 
-/// Common start of all file names of Embree on Unix.
-const STEM: &str = "libembree";
+/// Common start of all file names of Embree.
+const STEM: &str = if cfg!(windows) { "embree" } else { "libembree" };
 
 impl Library {
     /// Loads the library that [`LIBRARY_VARIABLE`] names. If it names none, loads the first usable of `libembree*` below

@@ -7,6 +7,13 @@ use std::path::{Path, PathBuf};
 
 pub use libloading::Library;
 
+#[cfg(unix)]
+#[path = "unix.rs"]
+mod system;
+#[cfg(windows)]
+#[path = "windows.rs"]
+mod system;
+
 /// Number of levels of subfolders that [`find_below`] searches.
 const MAX_DEPTH: usize = 3;
 
@@ -64,7 +71,18 @@ pub fn path_from_env(name: &str) -> Option<PathBuf> {
 /// Loading runs the file's initialisers, so the file must be trusted.
 pub unsafe fn open(path: &Path) -> Result<Library, Refusal> {
     // SAFETY: the caller guarantees that the file is trusted.
-    unsafe { Library::new(OsStr::new(path)) }.map_err(|error| Refusal::by_loader(path, &error))
+    unsafe { system::open(path) }.map_err(|error| Refusal::by_loader(path, &error))
+}
+
+/// Loads a library file for the rest of the process, so that another loader of the same path takes it.
+///
+/// Loading runs the file's initialisers, so the file must be trusted.
+///
+/// # Errors
+/// The system's loader cannot load the file.
+pub fn preload(path: &Path) -> Result<(), Refusal> {
+    // SAFETY: initialisers run here. The documentation requires a trusted file.
+    unsafe { open(path) }.map(std::mem::forget)
 }
 
 /// Loads the first of the `candidates`, library files, that `load` accepts.
@@ -137,37 +155,8 @@ pub fn file_name(path: &Path) -> &str {
 
 /// The file that contains the code or data at `address`, under the name by which it was loaded; `None` if there is
 /// none.
-#[cfg(unix)]
 pub fn file_containing(address: usize) -> Option<PathBuf> {
-    use std::ffi::{CStr, c_char, c_int, c_void};
-    use std::os::unix::ffi::OsStrExt;
-
-    #[repr(C)]
-    struct DlInfo {
-        file_name: *const c_char,
-        file_base: *mut c_void,
-        symbol_name: *const c_char,
-        symbol_address: *mut c_void,
-    }
-    unsafe extern "C" {
-        fn dladdr(address: *const c_void, info: *mut DlInfo) -> c_int;
-    }
-    let null = std::ptr::null_mut();
-    let mut info =
-        DlInfo { file_name: null as *const _, file_base: null, symbol_name: null as *const _, symbol_address: null };
-    // SAFETY: `dladdr` only looks the address up, and fills in `info` when it returns non-zero.
-    if unsafe { dladdr(address as *const c_void, &mut info) } == 0 || info.file_name.is_null() {
-        return None;
-    }
-    // SAFETY: a non-null name is a C string that is valid while the library is loaded. The bindings never unload one.
-    let name = unsafe { CStr::from_ptr(info.file_name) };
-    Some(PathBuf::from(OsStr::from_bytes(name.to_bytes())))
-}
-
-/// Always `None`: this system does not report the file that contains an address.
-#[cfg(not(unix))]
-pub fn file_containing(_address: usize) -> Option<PathBuf> {
-    None
+    system::file_containing(address)
 }
 
 #[cfg(test)]

@@ -12,10 +12,26 @@ use crate::library::{LIBRARY_VARIABLE, Library};
 
 /// File names of Open Image Denoise for the system's loader, best first: of runtime packages, then of development
 /// packages.
+#[cfg(not(any(target_os = "macos", windows)))]
 const NAMES: &[&str] = &["libOpenImageDenoise.so.2", "libOpenImageDenoise.so"];
+#[cfg(target_os = "macos")]
+const NAMES: &[&str] = &[
+    "libOpenImageDenoise.2.dylib",
+    "libOpenImageDenoise.dylib",
+    "/opt/homebrew/lib/libOpenImageDenoise.dylib",
+    "/usr/local/lib/libOpenImageDenoise.dylib",
+];
+#[cfg(windows)]
+const NAMES: &[&str] = &["OpenImageDenoise.dll"];
 
 /// Common start of all file names of Open Image Denoise. Names of its modules start differently.
-const STEM: &str = "libOpenImageDenoise.so";
+const STEM: &str = if cfg!(windows) {
+    "OpenImageDenoise.dll"
+} else if cfg!(target_os = "macos") {
+    "libOpenImageDenoise."
+} else {
+    "libOpenImageDenoise.so"
+};
 
 /// The library that [`Library::load`] found; `None` before.
 static LOADED: Mutex<Option<Library>> = Mutex::new(None);

@@ -220,13 +220,11 @@ fn settings(args: &ConvergeArgs, rules: &Rules) -> Vec<(String, String)> {
 
 /// Names and values of facts about the machine and the libraries, for the report.
 fn machine(threads: usize, entries: &[Entry]) -> Vec<(String, String)> {
-    let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
     let embree = caustique::trace::library().ok().map(|library| library.version().to_string());
     let finished = entries.iter().any(|entry| entry.finish.is_some());
     let denoiser = if finished { caustique::finish::denoiser::library().ok() } else { None };
     let known = [
-        ("processor", model.map(|(_, name)| name.trim().to_string())),
+        ("processor", caustique::system::processor_name()),
         ("threads", Some(threads.to_string())),
         ("system", Some(format!("{} {}", std::env::consts::OS, std::env::consts::ARCH))),
         ("caustique", Some(env!("CARGO_PKG_VERSION").into())),

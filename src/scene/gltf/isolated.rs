@@ -51,7 +51,7 @@ pub(super) fn decode_each(bytes: u64, count: usize, decode: impl Fn(usize) -> De
     let free = memory::available().map_or(u64::MAX, |available| available.bytes);
     let seconds = BASE_SECONDS + bytes / BYTES_PER_SECOND;
     let limits = Limits { bytes: most.min(free), seconds: u32::try_from(seconds).unwrap_or(u32::MAX) };
-    let work = |writer: &mut io::PipeWriter| {
+    let work = |writer: &mut dyn Write| {
         for index in 0..count {
             let decoded = catch_unwind(AssertUnwindSafe(|| decode(index)));
             let decoded = decoded.unwrap_or_else(|_| Err("the decoder failed".into()));
@@ -60,7 +60,7 @@ pub(super) fn decode_each(bytes: u64, count: usize, decode: impl Fn(usize) -> De
             }
         }
     };
-    let read = |reader: &mut io::PipeReader| {
+    let read = |reader: &mut dyn Read| {
         let mut all: Vec<Decoded> = Vec::new();
         while all.len() < count && all.last().is_none_or(std::result::Result::is_ok) {
             let Ok(decoded) = read(reader) else { break };
@@ -90,7 +90,7 @@ pub(super) fn decode(bytes: u64, decode: impl Fn() -> Decoded) -> Result<Decoded
 }
 
 /// Writes a result: whether it is a success, its length, and its bytes.
-fn write(writer: &mut impl Write, decoded: &Decoded) -> io::Result<()> {
+fn write(writer: &mut dyn Write, decoded: &Decoded) -> io::Result<()> {
     let (sound, bytes) = match decoded {
         Ok(bytes) => (1, bytes.as_slice()),
         Err(cause) => (0, cause.as_bytes()),
@@ -101,7 +101,7 @@ fn write(writer: &mut impl Write, decoded: &Decoded) -> io::Result<()> {
 }
 
 /// Reads a result of [`write()`].
-fn read(reader: &mut impl Read) -> io::Result<Decoded> {
+fn read(reader: &mut dyn Read) -> io::Result<Decoded> {
     let (mut sound, mut length) = ([0], [0; 8]);
     reader.read_exact(&mut sound)?;
     reader.read_exact(&mut length)?;

@@ -13,9 +13,9 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::files;
 use crate::memory;
 use crate::stop::Stop;
+use crate::system;
 use crate::temporary;
 use std::ffi::OsString;
-use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Child, Output, Stdio};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -170,7 +170,10 @@ impl<'p> Converter<'p> {
         let bytes = memory::available().map_or(0, |available| available.bytes);
         command.arg("--guard").arg(max_seconds()?.to_string()).arg(bytes.to_string());
         // In its own process group, so that Ctrl-C reaches only this program. The converter ends when its stdin closes.
-        command.process_group(0).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        system::shield_from_interrupts(&mut command)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
         let output = command.spawn().and_then(|child| wait_or_stop(child, stop)).map_err(|cause| {
             Error::new(ErrorKind::Library, self.interpreter.path().display(), cause).hint(python::HINT)
         })?;

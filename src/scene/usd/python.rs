@@ -2,14 +2,15 @@
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::installed;
+use crate::system;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Environment variable with the path of the Python interpreter.
 pub const VARIABLE: &str = "CAUSTIQUE_USD_PYTHON";
 
-/// Path of the Python that `scripts/setup.sh usd` installs, in the project's folder.
-const ENVIRONMENT: &str = ".venv-usd/bin/python";
+/// The virtual environment that `scripts/setup.sh usd` installs, in the project's folder.
+const ENVIRONMENT: &str = ".venv-usd";
 
 /// Hint that ends errors about a missing Python or module.
 pub(super) const HINT: &str = "run 'scripts/setup.sh usd', or install what scripts/requirements-usd.txt lists (pip \
@@ -40,7 +41,8 @@ impl Interpreter {
                 Err(Error::new(ErrorKind::Library, format!("{VARIABLE}={}", path.display()), "no such file").hint(HINT))
             };
         }
-        Ok(Interpreter { path: installed::find(ENVIRONMENT).unwrap_or_else(|| "python3".into()) })
+        let own = installed::find(&format!("{ENVIRONMENT}/{}", system::PYTHON_OF_ENVIRONMENT));
+        Ok(Interpreter { path: own.unwrap_or_else(|| system::PYTHON.into()) })
     }
 
     /// The path of the interpreter, or the name that the system searches for.
