@@ -25,7 +25,9 @@ impl AnisotropicTables {
     pub fn profile(
         &self,
         [along_x, along_y]: [Position; 2],
-        (n, constant, factors): (usize, f32, Vec4),
+        n: usize,
+        constant: f32,
+        factors: Vec4,
         make: impl Fn(f32, f32, Vec3) -> [Vec4; 2],
     ) -> AnisotropicProfile {
         let pairs = self.0.get_or_init(|| (0..NODES * NODES).map(|_| OnceLock::new()).collect());

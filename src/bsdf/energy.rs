@@ -206,23 +206,23 @@ impl SideTables {
 
     /// The loss [`SideTables::white_loss`] for anisotropic roughness.
     pub fn anisotropic_white_loss(&self, alphas: [Position; 2]) -> AnisotropicProfile {
-        self.anisotropic(alphas, (REFLECTED, 1.0, -Vec4::X))
+        self.anisotropic(alphas, REFLECTED, 1.0, -Vec4::X)
     }
 
     /// The loss [`SideTables::glass_loss`] for anisotropic roughness.
     pub fn anisotropic_glass_loss(&self, alphas: [Position; 2], f0: f32, f90: f32) -> AnisotropicProfile {
-        self.anisotropic(alphas, (SCATTERED, 1.0, -Vec4::new(1.0, f0, f90, 0.0)))
+        self.anisotropic(alphas, SCATTERED, 1.0, -Vec4::new(1.0, f0, f90, 0.0))
     }
 
     /// The albedo [`SideTables::reflection`] for anisotropic roughness.
     pub fn anisotropic_reflection(&self, alphas: [Position; 2], f0: f32, f90: f32) -> AnisotropicProfile {
-        self.anisotropic(alphas, (REFLECTED, 0.0, Vec4::new(0.0, 1.0, f0, f90)))
+        self.anisotropic(alphas, REFLECTED, 0.0, Vec4::new(0.0, 1.0, f0, f90))
     }
 
-    /// The function of direction that [`AnisotropicTables::profile`] makes from `functions`, for these alphas.
-    fn anisotropic(&self, alphas: [Position; 2], functions: (usize, f32, Vec4)) -> AnisotropicProfile {
+    /// The function of direction that [`AnisotropicTables::profile`] makes for these alphas.
+    fn anisotropic(&self, alphas: [Position; 2], n: usize, constant: f32, factors: Vec4) -> AnisotropicProfile {
         let smooth = Smooth::new(self.eta);
-        self.anisotropic.profile(alphas, functions, |alpha_x, alpha_y, wo| {
+        self.anisotropic.profile(alphas, n, constant, factors, |alpha_x, alpha_y, wo| {
             let ggx = Ggx { alpha_x, alpha_y };
             let mut sums = [0.0; 5];
             over_facets(&ggx, wo, 1.0, |lambda_o, h, weight| {

@@ -58,7 +58,7 @@ impl RoughDiffuse {
     /// Values of the lobes of single and of multiple scattering, relative to Lambertian reflection, for two unit
     /// directions above the surface with the table positions of their cosines.
     #[inline]
-    pub fn values(&self, (o, at_o): (Vec3, Position), (i, at_i): (Vec3, Position)) -> [f32; 2] {
+    pub fn values(&self, o: Vec3, at_o: Position, i: Vec3, at_i: Position) -> [f32; 2] {
         let s = o.x * i.x + o.y * i.y;
         let retroreflection = if s > 0.0 { s / o.z.max(i.z) } else { s };
         let single = self.scale * (1.0 + self.roughness * retroreflection).max(0.0);

@@ -124,7 +124,7 @@ impl Layered<'_> {
         match &self.interface.rough_diffuse {
             None => self.diffuse * through,
             Some(rough) => {
-                let [single, multiple] = rough.values((view.o, view.at), (i, at_i));
+                let [single, multiple] = rough.values(view.o, view.at, i, at_i);
                 (self.diffuse * single + self.diffuse_multiple * multiple) * through
             }
         }

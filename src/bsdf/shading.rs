@@ -266,7 +266,7 @@ impl<'a> Shading<'a> {
     #[inline]
     pub fn sample(&self, transport: Transport, set: LobeSet, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
         match self.coat(&self.view, set) {
-            Some((coat, share)) if share > 0.0 => self.sample_coated((coat, share), transport, set, u_lobe, u),
+            Some((coat, share)) if share > 0.0 => self.sample_coated(coat, share, transport, set, u_lobe, u),
             _ => self.sample_base(transport, set, u_lobe, u),
         }
     }
@@ -286,7 +286,8 @@ impl<'a> Shading<'a> {
     #[inline(never)]
     fn sample_coated(
         &self,
-        (coat, share): (&Coat<'_>, f32),
+        coat: &Coat<'_>,
+        share: f32,
         transport: Transport,
         set: LobeSet,
         u_lobe: f32,

@@ -318,7 +318,7 @@ impl PixelAccumulator {
     /// levels come from `independent`.
     #[inline]
     pub fn add(&mut self, i: u64, independent: &PixelSample, correlated: Option<&PixelSample>) {
-        self.add_with_groups(i, independent, correlated, (&[], None));
+        self.add_with_groups(i, independent, correlated, &[], None);
     }
 
     /// Adds an iteration as [`PixelAccumulator::add`] does, and at the picture level for each light group its light and
@@ -328,7 +328,8 @@ impl PixelAccumulator {
         i: u64,
         independent: &PixelSample,
         correlated: Option<&PixelSample>,
-        (groups, lobes): (&[[Rgb; 2]], Option<&LobeLight>),
+        groups: &[[Rgb; 2]],
+        lobes: Option<&LobeLight>,
     ) {
         let (count, own) = (self.levels(), self.picture_level());
         let mut values = [Rgb::ZERO; MAX_LEVELS];

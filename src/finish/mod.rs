@@ -418,7 +418,7 @@ impl Finish {
         let ([picture, spread], clamped) = self.displaced(&estimate, &denoised);
         drop(denoised);
         let noise = self.noise(&estimate, &spread);
-        let parts = self.parts((parts, &colors), &picture, noise, wanted)?;
+        let parts = self.parts(parts, &colors, &picture, noise, wanted)?;
         let account = Finished { combined, error, error_map: error_map.flatten(), clamped };
         Ok(FinishedPicture { picture, parts, account })
     }
@@ -439,7 +439,8 @@ impl Finish {
     /// the picture, or to its caustics, are all finished if one of them is wanted.
     fn parts(
         &mut self,
-        (parts, colors): (Vec<Named>, &[Named]),
+        parts: Vec<Named>,
+        colors: &[Named],
         picture: &Picture,
         noise: Noise<'_>,
         wanted: impl Fn(&str) -> bool,

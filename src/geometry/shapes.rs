@@ -78,6 +78,6 @@ impl Shapes {
     pub fn surface(&self, instance: u32, primitive: u32, barycentric: [f32; 2]) -> Option<Surface> {
         let placed = &self.instances[instance as usize];
         let mesh = placed.mesh as usize;
-        Surface::at((instance, placed), &self.packed[mesh], &self.meshes[mesh], primitive, barycentric)
+        Surface::at(instance, placed, &self.packed[mesh], &self.meshes[mesh], primitive, barycentric)
     }
 }

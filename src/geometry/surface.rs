@@ -37,7 +37,8 @@ impl Surface {
     /// The surface at barycentric coordinates (`b1`, `b2`) of triangle `primitive`. `None` for a triangle without area.
     #[inline(always)]
     pub(super) fn at(
-        (instance_index, instance): (u32, &Instance),
+        instance_index: u32,
+        instance: &Instance,
         packed: &PackedMesh,
         mesh: &Mesh,
         primitive: u32,

@@ -175,7 +175,7 @@ impl CausticTargets {
         if u < share {
             let radius = region.sample(u / share);
             emission.entry = EntryDisc::Region(radius);
-            emission.origin = Self::sample_origin(sky, emission.direction, (region.center, radius), point);
+            emission.origin = Self::sample_origin(sky, emission.direction, region.center, radius, point);
             self.apply_mixture(sky, emission);
         } else {
             self.aim(sky, emission, (u - share) / (1.0 - share), point);
@@ -200,13 +200,14 @@ impl CausticTargets {
     /// that it has in the mixture of the discs of scene and targets.
     pub fn aim_at(&self, sky: &Sky, emission: &mut EmissionSample, target: usize, point: Vec2) {
         emission.entry = EntryDisc::Target(target);
-        emission.origin = Self::sample_origin(sky, emission.direction, self.spheres[target], point);
+        let (center, radius) = self.spheres[target];
+        emission.origin = Self::sample_origin(sky, emission.direction, center, radius, point);
         self.apply_mixture(sky, emission);
     }
 
     /// Samples a line along the unit `d` through the disc of a sphere, and returns a point on it outside the scene's
     /// bounding sphere, where a light path can start.
-    fn sample_origin(sky: &Sky, d: Vec3, (center, radius): (Vec3, f32), point: Vec2) -> Vec3 {
+    fn sample_origin(sky: &Sky, d: Vec3, center: Vec3, radius: f32, point: Vec2) -> Vec3 {
         let frame = Frame::from_normal(d);
         let q = warp::disc_concentric(point) * radius;
         let p = center + frame.t * q.x + frame.b * q.y;

@@ -29,7 +29,7 @@ pub struct Bounds {
 impl Bounds {
     /// Bounds of a point that emits around `axis` as far as the angle `reach` (rad), with the luminance `intensity` of its
     /// maximum radiant intensity (W/sr). `spread` is the maximum angle between `axis` and the light's own axis (rad).
-    pub fn of_point(p: Vec3, (axis, spread): (Vec3, f32), reach: f32, intensity: f32) -> Bounds {
+    pub fn of_point(p: Vec3, axis: Vec3, spread: f32, reach: f32, intensity: f32) -> Bounds {
         Bounds { low: p, high: p, axis, spread, reach, two_sided: false, cosine: false, intensity }
     }
 

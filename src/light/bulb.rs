@@ -31,7 +31,7 @@ pub fn ball_point(p: Vec3, radius: f32, u: Vec2) -> Vec3 {
 /// The share of the light of a ball along a line through it that the ray from `origin` along the unit `d`, of length
 /// `reach`, crosses, and the distance to the point of the line up to which it has crossed the part `u` of this share.
 /// `None` if it crosses none. For a uniform `u`, the points have the density of [`ball_point`] along the line.
-pub(super) fn crossed_share((p, radius): (Vec3, f32), origin: Vec3, d: Vec3, reach: f32, u: f32) -> Option<(f32, f32)> {
+pub(super) fn crossed_share(p: Vec3, radius: f32, origin: Vec3, d: Vec3, reach: f32, u: f32) -> Option<(f32, f32)> {
     let to = p - origin;
     let middle = to.dot(d);
     let half2 = sqr(radius) - (to - d * middle).length_squared();
@@ -77,11 +77,11 @@ mod tests {
         assert!((all as f32 - expected).abs() < 5.0 * expected.sqrt(), "{all} {expected}");
         for (count, cut) in near.into_iter().zip(cuts) {
             let origin = side - d * 10.0;
-            let (share, _) = crossed_share((Vec3::ZERO, radius), origin, d, 10.0 + cut, 0.5).expect("it is crossed");
+            let (share, _) = crossed_share(Vec3::ZERO, radius, origin, d, 10.0 + cut, 0.5).expect("it is crossed");
             let (found, error) = (count as f32 / all as f32, (0.25 / all as f32).sqrt());
             assert!((found - share).abs() < 5.0 * error + 2e-3, "{cut}: {found} {share}");
             assert!((found - share - 0.05).abs() > 5.0 * error + 2e-3, "an error of 0.05 is not detected");
         }
-        assert_eq!(crossed_share((Vec3::ZERO, radius), side * 3.0, d, 10.0, 0.5), None);
+        assert_eq!(crossed_share(Vec3::ZERO, radius, side * 3.0, d, 10.0, 0.5), None);
     }
 }

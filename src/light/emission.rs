@@ -1,6 +1,6 @@
 //! Samples of lights for next-event estimation and for light paths, with their densities.
 
-use crate::math::{Rgb, Vec3};
+use crate::math::{DVec2, Rgb, Vec2, Vec3};
 
 /// A sampled point or direction of a light, as seen from a receiver (a point that receives light), for next-event
 /// estimation.
@@ -23,6 +23,15 @@ pub struct DirectSample {
     pub arrival_factor: f32,
     /// Index of the sampled light in [`Lights::emitters`](super::Lights::emitters).
     pub light: u32,
+}
+
+/// Random points of the unit square for the start of a light path.
+#[derive(Clone, Copy)]
+pub struct EmissionDraws {
+    /// Choice of the light, and of the target that it is aimed at.
+    pub choice: DVec2,
+    pub point: Vec2,
+    pub direction: Vec2,
 }
 
 /// Densities with which a light path starts at a point of a light in a direction, as the MIS weights need them.

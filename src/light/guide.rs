@@ -11,12 +11,12 @@
 //!
 //! [`Guide::learn`] sets the probabilities of the cells from the error that their photons leave in the picture.
 
-use super::emission::{EmissionSample, EntryDisc};
+use super::emission::{EmissionDraws, EmissionSample, EntryDisc};
 use super::lights::Lights;
 use super::{Cdf, Emitter, Region};
 use crate::geometry::{Shapes, offset_origin};
 use crate::material::Materials;
-use crate::math::{DVec2, Frame, Rgb, Vec2, Vec3, one_minus_cos, warp};
+use crate::math::{Frame, Rgb, Vec2, Vec3, one_minus_cos, warp};
 use std::f32::consts::PI;
 use std::ops::Range;
 
@@ -204,8 +204,7 @@ impl Guide {
     }
 
     /// Samples the start of a light path. Part of the starts from infinity without a target go through the region of
-    /// interest (the sphere around most visible surfaces), if there is one. `choice`, `point` and `direction` are
-    /// uniform on the unit square.
+    /// interest (the sphere around most visible surfaces), if there is one.
     #[inline]
     pub fn emit(
         &self,
@@ -213,7 +212,7 @@ impl Guide {
         shapes: &Shapes,
         materials: &Materials,
         region: Option<Region>,
-        (choice, point, direction): (DVec2, Vec2, Vec2),
+        EmissionDraws { choice, point, direction }: EmissionDraws,
     ) -> Option<GuidedEmission> {
         let (cell, _, rest) = self.choice.sample(choice.y);
         let (light, target) = self.cells[cell];

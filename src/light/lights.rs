@@ -241,7 +241,8 @@ impl Lights {
     /// which the uniform number `u` selects. `camera`: the ray starts at the camera.
     pub fn for_each_bulb(
         &self,
-        (origin, d): (Vec3, Vec3),
+        origin: Vec3,
+        d: Vec3,
         reach: f32,
         camera: bool,
         u: f32,
@@ -252,11 +253,11 @@ impl Lights {
             if camera && emitter.bulb().is_some_and(|bulb| bulb.hidden_from_camera) {
                 continue;
             }
-            let Some((ball, intensity)) = emitter.bulb_along(-d) else { continue };
+            let Some(((p, radius), intensity)) = emitter.bulb_along(-d) else { continue };
             if intensity != Rgb::ZERO
-                && let Some((share, distance)) = crossed_share(ball, origin, d, reach, u)
+                && let Some((share, distance)) = crossed_share(p, radius, origin, d, reach, u)
             {
-                each(intensity * (share / (PI * ball.1 * ball.1)), distance, self.group(index));
+                each(intensity * (share / (PI * radius * radius)), distance, self.group(index));
             }
         }
     }
@@ -412,7 +413,7 @@ impl Lights {
     pub(super) fn redirect(&self, emission: &mut EmissionSample, d: Vec3) -> Option<()> {
         let emitter = &self.emitters[emission.light as usize];
         let (onward, cos) = emitter.density(d)?;
-        emission.flux = emitter.redirected_flux(emission, d, (onward, cos))?;
+        emission.flux = emitter.redirected_flux(emission, d, onward, cos)?;
         emission.direction = d;
         (emission.density.onward, emission.density.cos) = (onward, cos);
         Some(())

@@ -27,7 +27,7 @@ pub use bulb::Bulb;
 pub use cdf::Cdf;
 pub use cone::Cone;
 pub use distribution::{Distribution, Pattern, SpotCone};
-pub use emission::{DirectSample, EmissionDensity, EmissionSample, EntryDisc};
+pub use emission::{DirectSample, EmissionDensity, EmissionDraws, EmissionSample, EntryDisc};
 pub use environment::{Environment, ImageEnvironment};
 pub use group::{Group, Groups, MAX_GROUP_NAME, MAX_GROUPS};
 pub use guide::Guide;

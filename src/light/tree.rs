@@ -227,7 +227,7 @@ impl LightTree {
 
     /// Intensity of the light at index `k` of `order` over the intensity of the cluster that contains it, 0 to 1.
     #[inline]
-    fn intensity_share(&self, k: usize, (siblings, lane): (&Siblings, usize)) -> f32 {
+    fn intensity_share(&self, k: usize, siblings: &Siblings, lane: usize) -> f32 {
         let sum = |first: usize, count: usize| self.below[first + count] - self.below[first];
         let all = sum(siblings.first[lane] as usize, siblings.count[lane] as usize);
         // The difference may round to zero if far stronger lights precede the cluster.
@@ -237,12 +237,12 @@ impl LightTree {
     /// Selects a light of a cluster in proportion to intensity, by the uniform number `u`. Returns the index of its
     /// emitter and its probability.
     #[inline]
-    fn sample_by_intensity(&self, (siblings, lane): (&Siblings, usize), u: f64) -> (u32, f32) {
+    fn sample_by_intensity(&self, siblings: &Siblings, lane: usize, u: f64) -> (u32, f32) {
         let start = siblings.first[lane] as usize;
         let end = start + siblings.count[lane] as usize;
         let target = self.below[start] + u * (self.below[end] - self.below[start]);
         let k = start + self.below[start + 1..end].partition_point(|&below| below <= target);
-        (self.order[k], self.intensity_share(k, (siblings, lane)))
+        (self.order[k], self.intensity_share(k, siblings, lane))
     }
 
     /// Approximate upper bound on the irradiance of all lights of the tree at a receiver (W/m2, luminance).
@@ -270,7 +270,7 @@ impl LightTree {
         let (emitter, share) = if siblings.children[lane] == 0 {
             (self.order[siblings.first[lane] as usize], 1.0)
         } else {
-            self.sample_by_intensity((siblings, lane), u)
+            self.sample_by_intensity(siblings, lane, u)
         };
         pdf *= share;
         (pdf > 0.0).then_some((emitter as usize, pdf))
@@ -291,7 +291,7 @@ impl LightTree {
             let importance = siblings.importance(at);
             // Below a compact cluster, selection is by intensity.
             if importance.is_compact(lane) && siblings.children[lane] != 0 {
-                pdf = self.intensity_share(own, (siblings, lane));
+                pdf = self.intensity_share(own, siblings, lane);
             }
             if cluster == 0 {
                 return pdf;

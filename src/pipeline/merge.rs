@@ -74,7 +74,7 @@ impl Shards {
                 return Err(error.hint("merge files that --shard I/N made, or whole renders of other seeds alone"));
             };
             if let Some((first, whole)) = files.first() {
-                check_same_render((first, whole), (path, &file))?;
+                check_same_render(first, whole, path, &file)?;
             }
             let own = file.facts.motion.take();
             motion = motion.or(own);
@@ -196,7 +196,7 @@ fn add_pixels(path: &Path, file: &mut ShardFile, pixels: &mut Vec<PixelAccumulat
 }
 
 /// Fails if the second shard is not of the render of the first.
-fn check_same_render((first, whole): (&Path, &ShardFile), (path, file): (&Path, &ShardFile)) -> Result<()> {
+fn check_same_render(first: &Path, whole: &ShardFile, path: &Path, file: &ShardFile) -> Result<()> {
     let error = |cause: String| Error::new(ErrorKind::Usage, path.display(), cause);
     let first = first.display();
     if file.head.scene != whole.head.scene {

@@ -76,8 +76,8 @@ fn vector(
     pixel: (u32, u32),
 ) -> Option<[f32; 4]> {
     let surface = visible_surface(camera_paths, arena, pixel)?;
-    let hit = (surface.instance, surface.primitive);
-    let point = TrianglePoint::new(camera_paths.scene, hit, surface.p.as_dvec3());
+    let p = surface.p.as_dvec3();
+    let point = TrianglePoint::new(camera_paths.scene, surface.instance, surface.primitive, p);
     let position = now.position(&point)?;
     let place = now.camera.project(position)?;
     let [(width, height), _] = camera_paths.camera.whole();

@@ -136,7 +136,7 @@ fn draw(
         .label_style((FONT, 15).into_font().color(&INK))
         .axis_desc_style((FONT, 16).into_font().color(&INK))
         .draw()?;
-    floor(&mut chart, plot, (left, right), low)?;
+    floor(&mut chart, plot, left, right, low)?;
     guides(&mut chart, plot)?;
     for line in 0..plot.curves.len() {
         series(&mut chart, plot, line)?;
@@ -187,7 +187,8 @@ fn series(
 fn floor(
     chart: &mut Chart<'_, '_>,
     plot: &Plot<'_>,
-    (left, right): (f64, f64),
+    left: f64,
+    right: f64,
     low: f64,
 ) -> std::result::Result<(), Box<dyn std::error::Error>> {
     let Some(own) = plot.subject.reference.error.of(plot.metric).filter(|own| *own > low) else { return Ok(()) };

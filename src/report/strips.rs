@@ -47,7 +47,7 @@ pub struct Seen {
 }
 
 impl Seen {
-    fn of(subject: &Subject, (point, picture): (&Point, &Picture)) -> Result<Seen> {
+    fn of(subject: &Subject, point: &Point, picture: &Picture) -> Result<Seen> {
         let mut errors = compare_pictures(picture, &subject.reference.picture, Floor::Papers, 0)?;
         errors.measure_inside(&subject.inside);
         Ok(Seen { line: point.line, iterations: point.iterations, seconds: point.seconds, errors })
@@ -168,6 +168,7 @@ pub(super) fn gallery(
         pictures: parts.into_iter().map(|part| crop::picture(&reference.picture, part, look)).collect::<Result<_>>()?,
         heat_maps: Vec::new(),
     };
-    let seen = at_time.iter().zip(&timed).map(|shown| Seen::of(subject, shown)).collect::<Result<_>>()?;
+    let of = |(point, picture): (_, &_)| Seen::of(subject, point, picture);
+    let seen = at_time.iter().zip(&timed).map(of).collect::<Result<_>>()?;
     Ok(Gallery { windows, reference: whole, strips, seen })
 }

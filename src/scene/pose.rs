@@ -32,7 +32,7 @@ pub struct TrianglePoint {
 
 impl TrianglePoint {
     /// The point of triangle `primitive` of an instance of the scene that is nearest to `p`.
-    pub fn new(scene: &Scene, (instance, primitive): (u32, u32), p: DVec3) -> TrianglePoint {
+    pub fn new(scene: &Scene, instance: u32, primitive: u32, p: DVec3) -> TrianglePoint {
         let placed = &scene.shapes.instances[instance as usize];
         let mesh = &scene.shapes.meshes[placed.mesh as usize];
         let [a, b, c] = placed.corners(mesh, primitive).map(|corner| corner.as_dvec3());

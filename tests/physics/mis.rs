@@ -428,9 +428,8 @@ impl<'s> Whole<'s> {
                     mis::camera(&lights[k - 1], joins(k), pdf_a, light_paths as f32, back).weight(eta)
                 }
                 Candidate::Merge(m) => {
-                    let subpaths = (&lights[m], &eyes[m]);
-                    let joins = [joins(m + 1), joins(k - m)];
-                    mis::merge(subpaths, joins, reverse(m, true), reverse(m, false), by_camera(m)).merge_weight(eta)
+                    let (joins, own) = ([joins(m + 1), joins(k - m)], by_camera(m));
+                    mis::merge(&lights[m], &eyes[m], joins, reverse(m, true), reverse(m, false), own).merge_weight(eta)
                 }
             })
         };

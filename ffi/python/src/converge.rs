@@ -103,10 +103,10 @@ pub fn converge<'py>(
     keywords.check_all_taken()?;
     let camera = scene.loaded.scene.camera(&comparison.common.camera_request().map_err(raised)?).map_err(raised)?;
     let reference = given.map(|given| reference(&given, camera.size())).transpose()?;
-    let settings = comparison.settings()?;
+    let (settings, own) = comparison.settings()?;
     let done = work(py, threads, |caller| {
         let callback = Callback { caller, progress };
-        comparison.run((scene, &camera), settings, reference, &callback)
+        comparison.run(scene, &camera, settings, own, reference, &callback)
     })?;
     to_python(py, &done.whole()?)
 }
@@ -193,8 +193,10 @@ impl Comparison {
 
     fn run(
         self,
-        (scene, camera): (&Compared<'_>, &Camera),
-        (settings, own): (Vec<Settings>, Settings),
+        scene: &Compared<'_>,
+        camera: &Camera,
+        settings: Vec<Settings>,
+        own: Settings,
         reference: Option<Reference>,
         callback: &Callback<'_>,
     ) -> Result<Value> {
@@ -202,7 +204,7 @@ impl Comparison {
         for of in &settings {
             check_settings(of, scene.path, built)?;
         }
-        let (entries, mut finishes) = self.entries((scene, camera), settings, callback)?;
+        let (entries, mut finishes) = self.entries(scene, camera, settings, callback)?;
         memory::check_all(View::new(built, camera), entries.iter().map(|entry| &entry.settings))?;
         let reference = reference.unwrap_or_else(|| self.render_reference(own, View::new(built, camera), callback));
         let SettingsRequest { seed, iterations, .. } = self.common.settings;
@@ -252,7 +254,8 @@ impl Comparison {
     /// Settles the methods by `auto`, opens the finishes, and issues the warnings of the plans.
     fn entries(
         &self,
-        (scene, camera): (&Compared<'_>, &Camera),
+        scene: &Compared<'_>,
+        camera: &Camera,
         settings: Vec<Settings>,
         callback: &Callback<'_>,
     ) -> Result<(Vec<Entry>, Vec<Option<Finish>>)> {

@@ -47,7 +47,7 @@ pub fn merge(
 ) -> PyResult<Image> {
     let are_shards = py.detach(|| paths.iter().map(|path| is_shard(path)).collect::<Result<Vec<bool>>>());
     if !paths.is_empty() && !are_shards.map_err(raised)?.contains(&true) {
-        return average(py, &paths, (finish, denoise, model), layers.as_deref(), threads);
+        return average(py, &paths, finish, denoise, model, layers.as_deref(), threads);
     }
     let shards = py.detach(|| Shards::open(&paths, partial)).map_err(raised)?;
     let arguments = shards.arguments();
@@ -74,7 +74,9 @@ pub fn merge(
 fn average(
     py: Python<'_>,
     paths: &[PathBuf],
-    (finish, denoise, model): (Option<bool>, Option<String>, Option<String>),
+    finish: Option<bool>,
+    denoise: Option<String>,
+    model: Option<String>,
     layers: Option<&str>,
     threads: usize,
 ) -> PyResult<Image> {

@@ -82,7 +82,8 @@ pub fn write(
     subject: &Subject,
     outcome: &mut Outcome,
     summary: &Summary,
-    (inputs, threads): (&[PathBuf], usize),
+    inputs: &[PathBuf],
+    threads: usize,
 ) -> Result<()> {
     let folder = &args.output;
     let bytes = |name: &str, bytes: &[u8]| atomic::write_bytes(&folder.join(name), bytes);
@@ -104,7 +105,7 @@ pub fn write(
         plots.push(row);
     }
     bytes("index.html", page::html(subject, outcome, summary, &plots)?.as_bytes())?;
-    write_pictures(folder, subject, outcome, (inputs, threads))?;
+    write_pictures(folder, subject, outcome, inputs, threads)?;
     if args.progress.for_people() {
         if let Some(verdict) = verdict(subject, summary) {
             say(&verdict);
@@ -123,7 +124,8 @@ fn write_pictures(
     folder: &Path,
     subject: &Subject,
     outcome: &mut Outcome,
-    (inputs, threads): (&[PathBuf], usize),
+    inputs: &[PathBuf],
+    threads: usize,
 ) -> Result<()> {
     let path = |name: &str| folder.join(format!("{name}.exr"));
     let is_input = |name: &str| inputs.iter().any(|input| files::is_same(input, &path(name)));

@@ -107,7 +107,7 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     let look = Look { exposure: args.exposure as f32, ..args.tonemap.into() };
     let wishes = ReportOptions { targets: args.targets.clone(), targets_of: more, windows, look, notes };
     let summary = summarize(&subject, &mut outcome, &wishes)?;
-    files::write(args, &subject, &mut outcome, &summary, (&inputs, threads))?;
+    files::write(args, &subject, &mut outcome, &summary, &inputs, threads)?;
     if let Some(error) = outcome.failures.pop() {
         return Err(error);
     }

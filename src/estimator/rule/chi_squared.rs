@@ -269,7 +269,7 @@ impl ChiSquared {
     /// [`ChiSquared::sums`] of their cells. Compares the statistic times the total with the quantile, which needs no
     /// division.
     #[inline]
-    fn looks_uniform(&self, annuli: usize, (total, squares): (f64, f64)) -> bool {
+    fn looks_uniform(&self, annuli: usize, total: f64, squares: f64) -> bool {
         squares * (annuli * self.sectors) as f64 <= total * (total + self.critical[annuli - 1])
     }
 
@@ -285,11 +285,11 @@ impl ChiSquared {
     /// they do not look uniform. Returns whether it has shrunk.
     #[inline(always)]
     fn test(&self, bandwidth: &mut Bandwidth, counts: &mut [u32]) -> bool {
-        let all = Self::sums(counts);
-        let rejected = all.0 >= f64::from(bandwidth.bound) && !self.looks_uniform(self.annuli, all);
+        let (total, squares) = Self::sums(counts);
+        let rejected = total >= f64::from(bandwidth.bound) && !self.looks_uniform(self.annuli, total, squares);
         if rejected {
             self.shrink(bandwidth, counts);
-        } else if all.0 >= MAX_COUNT {
+        } else if total >= MAX_COUNT {
             Self::halve(counts);
         }
         rejected
@@ -301,9 +301,9 @@ impl ChiSquared {
     #[inline(never)]
     fn shrink(&self, bandwidth: &mut Bandwidth, counts: &mut [u32]) {
         let passes = |annuli: usize| {
-            let inner = Self::sums(&counts[..annuli * self.sectors]);
+            let (total, squares) = Self::sums(&counts[..annuli * self.sectors]);
             // A disc without photons is not tested.
-            inner.0 > 0.0 && self.looks_uniform(annuli, inner)
+            total > 0.0 && self.looks_uniform(annuli, total, squares)
         };
         let factor = match (1..self.annuli).rev().find(|&annuli| passes(annuli)) {
             Some(annuli) => annuli as f32 / self.annuli as f32,
@@ -500,12 +500,8 @@ mod tests {
                 let (x, y) = uniform(trial, i);
                 count(&rule, &mut counts, (x.abs(), y));
             }
-            let statistic = ChiSquared::statistic(&counts);
-            assert_eq!(
-                rule.looks_uniform(2, ChiSquared::sums(&counts)),
-                statistic <= critical,
-                "{statistic} {critical}"
-            );
+            let (statistic, (total, squares)) = (ChiSquared::statistic(&counts), ChiSquared::sums(&counts));
+            assert_eq!(rule.looks_uniform(2, total, squares), statistic <= critical, "{statistic} {critical}");
         }
     }
 

@@ -143,7 +143,7 @@ fn decode(
     let reader = exr::block::read(file, false)?;
     let reads = wanted_channels(reader.headers(), wanted);
     let bounds = extent.bounds(reader.headers())?;
-    check_size(reader.headers(), length, (bounds.size, &reads))?;
+    check_size(reader.headers(), length, bounds.size, &reads)?;
     let chunks = reader.filter_chunks(false, |_, _, block| {
         block.level == exr::math::Vec2(0, 0) && reads[block.layer].contains(&true)
     })?;
@@ -184,7 +184,7 @@ fn wanted_channels(headers: &[Header], wanted: &dyn Fn(&str) -> bool) -> Vec<Vec
 
 /// Rejects headers that declare more data than the file can hold, before anything is allocated for them. `reads`: whether
 /// each channel is read, by part and by channel.
-fn check_size(headers: &[Header], length: u64, (canvas, reads): (Vec2<usize>, &[Vec<bool>])) -> Outcome<()> {
+fn check_size(headers: &[Header], length: u64, canvas: Vec2<usize>, reads: &[Vec<bool>]) -> Outcome<()> {
     let window = |size: exr::math::Vec2<usize>| size.0 as u128 * size.1 as u128;
     let mut taken = 0u128;
     for (header, reads) in headers.iter().zip(reads) {

@@ -77,7 +77,7 @@ impl Light for EnvironmentLight {
     }
 
     #[inline]
-    fn redirected_flux(&self, _: &EmissionSample, _: Vec3, _: (f32, f32)) -> Option<Rgb> {
+    fn redirected_flux(&self, _: &EmissionSample, _: Vec3, _: f32, _: f32) -> Option<Rgb> {
         None
     }
 

@@ -162,9 +162,9 @@ pub trait Light {
     /// the cosine at the light. `None` if it does not, and for light from infinity.
     fn density(&self, d: Vec3) -> Option<(f32, f32)>;
 
-    /// Flux of the start of a light path after its direction has been replaced by `d`, which has this
-    /// [`Light::density`]. `None` if the light emits nothing along `d`, and for light from infinity.
-    fn redirected_flux(&self, emission: &EmissionSample, d: Vec3, density: (f32, f32)) -> Option<Rgb>;
+    /// Flux of the start of a light path after its direction has been replaced by `d`, for which [`Light::density`]
+    /// gives `onward` and `cos`. `None` if the light emits nothing along `d`, and for light from infinity.
+    fn redirected_flux(&self, emission: &EmissionSample, d: Vec3, onward: f32, cos: f32) -> Option<Rgb>;
 
     /// Radiance of light from infinity that a ray along `d` reaches when it leaves the scene, and the density of `d` in
     /// [`Light::sample`]. `None` if the ray reaches none. `camera`: the ray starts at the camera.

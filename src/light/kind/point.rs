@@ -34,7 +34,7 @@ impl Light for PointLight {
     }
 
     fn bounds(&self) -> Option<Bounds> {
-        Some(Bounds::of_point(self.p, (Vec3::Z, PI), 0.5 * PI, luminance(self.intensity)))
+        Some(Bounds::of_point(self.p, Vec3::Z, PI, 0.5 * PI, luminance(self.intensity)))
     }
 
     #[inline]
@@ -78,7 +78,7 @@ impl Light for PointLight {
     }
 
     #[inline]
-    fn redirected_flux(&self, emission: &EmissionSample, _: Vec3, _: (f32, f32)) -> Option<Rgb> {
+    fn redirected_flux(&self, emission: &EmissionSample, _: Vec3, _: f32, _: f32) -> Option<Rgb> {
         Some(emission.flux)
     }
 

@@ -79,9 +79,9 @@ impl Light for ShapedLight {
     fn bounds(&self) -> Option<Bounds> {
         let reach = polar_angle(self.distribution.reach());
         // The bound of wide lights must not depend on rounding at the back of the axis.
-        let axis = if reach < 3.0 { (self.frame.n, 0.0) } else { (Vec3::Z, PI) };
+        let (axis, spread) = if reach < 3.0 { (self.frame.n, 0.0) } else { (Vec3::Z, PI) };
         let brightest = luminance(self.intensity) * self.distribution.peak();
-        let bounds = Bounds::of_point(self.p, axis, reach.min(3.0), brightest);
+        let bounds = Bounds::of_point(self.p, axis, spread, reach.min(3.0), brightest);
         Some(bounds.with_box([self.p - self.radius, self.p + self.radius]))
     }
 
@@ -134,7 +134,7 @@ impl Light for ShapedLight {
     }
 
     #[inline]
-    fn redirected_flux(&self, emission: &EmissionSample, d: Vec3, (onward, _): (f32, f32)) -> Option<Rgb> {
+    fn redirected_flux(&self, emission: &EmissionSample, d: Vec3, onward: f32, _: f32) -> Option<Rgb> {
         let flux = self.intensity_along(d) / (onward * emission.density.start);
         (flux != Rgb::ZERO).then_some(flux)
     }

@@ -82,7 +82,7 @@ impl Light for SpotLight {
     fn bounds(&self) -> Option<Bounds> {
         // 1 - cos(x) = 2 sin^2(x / 2).
         let reach = 2.0 * (0.5 * self.outer).clamp(0.0, 1.0).sqrt().asin();
-        let bounds = Bounds::of_point(self.p, (self.frame.n, 0.0), reach, luminance(self.intensity));
+        let bounds = Bounds::of_point(self.p, self.frame.n, 0.0, reach, luminance(self.intensity));
         Some(bounds.with_box([self.p - self.radius, self.p + self.radius]))
     }
 
@@ -146,7 +146,7 @@ impl Light for SpotLight {
     }
 
     #[inline]
-    fn redirected_flux(&self, emission: &EmissionSample, _: Vec3, _: (f32, f32)) -> Option<Rgb> {
+    fn redirected_flux(&self, emission: &EmissionSample, _: Vec3, _: f32, _: f32) -> Option<Rgb> {
         Some(emission.flux)
     }
 

@@ -161,7 +161,7 @@ impl Light for TriangleLight {
     fn bounds(&self) -> Option<Bounds> {
         let [a, b, c] = [self.corners[0], self.corners[0] + self.corners[1], self.corners[0] + self.corners[2]];
         let intensity = luminance(self.radiance) * self.area * self.spread.relative_radiance(1.0);
-        let bounds = Bounds::of_point(a, (self.normal(), 0.0), 0.5 * PI, intensity);
+        let bounds = Bounds::of_point(a, self.normal(), 0.0, 0.5 * PI, intensity);
         let bounds = bounds.with_box([a.min(b).min(c), a.max(b).max(c)]);
         Some(Bounds { two_sided: self.two_sided, cosine: true, ..bounds })
     }
@@ -243,7 +243,7 @@ impl Light for TriangleLight {
     }
 
     #[inline]
-    fn redirected_flux(&self, emission: &EmissionSample, _: Vec3, (_, cos): (f32, f32)) -> Option<Rgb> {
+    fn redirected_flux(&self, emission: &EmissionSample, _: Vec3, _: f32, cos: f32) -> Option<Rgb> {
         if self.spread == Spread::LAMBERTIAN {
             return Some(emission.flux);
         }

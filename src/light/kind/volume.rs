@@ -76,7 +76,7 @@ impl Light for VolumeLight {
     }
 
     fn bounds(&self) -> Option<Bounds> {
-        let bounds = Bounds::of_point(Vec3::ZERO, (Vec3::Z, PI), 0.5 * PI, luminance(self.intensity()));
+        let bounds = Bounds::of_point(Vec3::ZERO, Vec3::Z, PI, 0.5 * PI, luminance(self.intensity()));
         Some(bounds.with_box(self.world_box()))
     }
 
@@ -125,7 +125,7 @@ impl Light for VolumeLight {
     }
 
     #[inline]
-    fn redirected_flux(&self, emission: &EmissionSample, _: Vec3, _: (f32, f32)) -> Option<Rgb> {
+    fn redirected_flux(&self, emission: &EmissionSample, _: Vec3, _: f32, _: f32) -> Option<Rgb> {
         Some(emission.flux)
     }
 

@@ -223,11 +223,9 @@ impl Passes {
                 return None;
             }
             let splats = SplatsByTile::new(&self.left, &self.tiles);
-            samples
-                .par_tiles()
-                .zip(recorders.par_iter_mut())
-                .enumerate()
-                .for_each(|(tile, film)| iteration.add_splats(&walks, splats.of(tile), film));
+            samples.par_tiles().zip(recorders.par_iter_mut()).enumerate().for_each(|(tile, (samples, recorder))| {
+                iteration.add_splats(&walks, splats.of(tile), samples, recorder)
+            });
             rejected += self.left.iter().map(|left| left.lost).sum::<u64>();
             photons.reserve(self.left.iter().map(|left| left.photons.len()).sum());
             self.left.iter().for_each(|left| photons.extend_from_slice(&left.photons));
@@ -388,7 +386,8 @@ impl Iteration<'_, '_> {
                     let connected = &vertices[traced.connected(cells, pixels[k])];
                     // All paths of a cell take one wavelength, so that they can be connected.
                     start.0.wavelength_sample = tracer.wavelength(pixels[k]);
-                    self.camera_path(walks, camera_arena, (place, start), connected, (samples, *recorder));
+                    let sample = self.camera_path(walks, camera_arena, place, start, connected, *recorder);
+                    samples.set(place.at, &sample);
                 }
             }
         }
@@ -400,17 +399,18 @@ impl Iteration<'_, '_> {
         &self,
         walks: &PairWalks<'_>,
         arena: &Bump,
-        (place, start): (&TilePixel, &CameraPathStart),
+        place: &TilePixel,
+        start: &CameraPathStart,
         vertices: &[LightVertex<'_>],
-        (samples, recorder): (&mut SampleBufferPart<'_>, &mut W),
-    ) {
+        recorder: &mut W,
+    ) -> PixelSample {
         let levels = self.levels(place.index as u32, walks.pair);
         let photons = self.photons_of_path(|| start.1.vertex(0).one(Purpose::Merging));
         let context = CameraWalkContext { vertices, photons, levels: &levels };
         recorder.select_pixel(place.at, walks.own);
         let mut sample = PixelSample::default();
         self.shared.camera_path(arena, start, &context, recorder, &mut sample);
-        samples.set(place.at, &sample);
+        sample
     }
 
     /// Adds to the samples of a tile the splats that it receives: light that light paths send to the film.
@@ -418,12 +418,13 @@ impl Iteration<'_, '_> {
         &self,
         walks: &PairWalks<'_>,
         splats: impl Iterator<Item = (&'l Splat, FirstScatter)>,
-        (mut samples, recorder): (SampleBufferPart<'_>, &mut W),
+        mut samples: SampleBufferPart<'_>,
+        recorder: &mut W,
     ) {
         for (splat, first) in splats {
             let levels = self.levels(splat.pixel, walks.pair);
             let (_, slot) = self.tiles.place(splat.pixel);
-            recorder.record_splat(slot, walks.own, (splat, first), &levels);
+            recorder.record_splat(slot, walks.own, splat, first, &levels);
             let mut sample = samples.get(slot);
             splat.apply(&levels, &mut sample);
             samples.set(slot, &sample);

@@ -94,7 +94,8 @@ impl Found {
     fn add(
         &mut self,
         technique: Technique,
-        (class, pixel): (PathClass, u32),
+        class: PathClass,
+        pixel: u32,
         value: Rgb,
         first: impl FnOnce() -> FirstScatter,
     ) {
@@ -111,7 +112,7 @@ impl Found {
         for (index, splat) in splats.iter().enumerate() {
             let value = splat.value * splat.ratios.weight(Eta::NONE);
             let first = || first.get(index).copied().unwrap_or_default();
-            self.add(Technique::Camera { light: splat.light }, (splat.class, splat.pixel), value, first);
+            self.add(Technique::Camera { light: splat.light }, splat.class, splat.pixel, value, first);
         }
     }
 }
@@ -121,7 +122,7 @@ impl PathRecorder for Found {
         if self.records_lobes && !is_sampled_by_chains(of.class) {
             self.others.add(&of.first, technique.is_direct(), value * weight);
         }
-        self.add(technique, (of.class, self.pixel), value * weight, || of.first);
+        self.add(technique, of.class, self.pixel, value * weight, || of.first);
     }
 
     fn first_surface(&mut self, colors: [Rgb; 3]) {
@@ -453,7 +454,7 @@ impl Integrator for Metropolis {
             let slot = tiles.slot(index as u32);
             let sample = &samples[slot];
             pixel.record_first_hit(i, || camera_paths.first_hit(sample));
-            pixel.add_with_groups(i, sample, None, (&[], lobes.get(slot)));
+            pixel.add_with_groups(i, sample, None, &[], lobes.get(slot));
         });
         phases.eye += cpu_seconds() - started;
         Some(Work { light_paths: u64::from(width) * u64::from(height), rejected, ..Work::default() })

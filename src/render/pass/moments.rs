@@ -470,7 +470,7 @@ impl Walks<'_, '_> {
                 let starts = self.variants[0].camera_paths.starts(&places, streams);
                 for (place, start) in places.iter().flatten().zip(starts.into_iter().flatten()) {
                     arena.reset();
-                    self.pair(&arena, place.index as u32, (&light_paths, start), maps, &mut output);
+                    self.pair(&arena, place.index as u32, &light_paths, start, maps, &mut output);
                 }
             }
         }
@@ -482,7 +482,8 @@ impl Walks<'_, '_> {
         &self,
         arena: &Bump,
         index: u32,
-        (light_paths, mut start): (&LightPaths<'_>, CameraPathStart),
+        light_paths: &LightPaths<'_>,
+        mut start: CameraPathStart,
         photons: &PhotonMaps,
         output: &mut RowOutput,
     ) {

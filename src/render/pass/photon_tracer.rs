@@ -121,7 +121,7 @@ impl PhotonTracer {
                 vec![timed_map(input, i, &paths, paths.count(), trace, phases, &mut work)]
             }
             Some(channels) => {
-                (0..).zip(channels).map(|(k, f)| channel_map(input, i, (k, *f), phases, &mut work)).collect()
+                (0..).zip(channels).map(|(k, f)| channel_map(input, i, k, *f, phases, &mut work)).collect()
             }
         };
         (maps, work)
@@ -177,7 +177,8 @@ impl PhotonTracer {
 fn channel_map(
     input: &RenderInput<'_>,
     i: u64,
-    (channel, flux): (u64, Option<EqualFlux>),
+    channel: u64,
+    flux: Option<EqualFlux>,
     phases: &mut Phases,
     work: &mut Work,
 ) -> Maps {

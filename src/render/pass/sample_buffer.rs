@@ -165,7 +165,7 @@ pub(super) fn add<'g>(
         let light = [own.indirect_photons[level], own.caustic_photons[level]];
         let (groups, lobes) = groups(slot);
         let lobes = lobes.or_else(|| samples.last().and_then(|samples| samples.lobes.get(slot)));
-        pixel.add_with_groups(i, &sample, others.as_ref(), (groups, lobes));
+        pixel.add_with_groups(i, &sample, others.as_ref(), groups, lobes);
         light.map(|light| u64::from(is_lit(light)))
     };
     let all = |(part, pixels): (usize, &mut [PixelAccumulator])| {

@@ -86,7 +86,8 @@ pub(super) trait TileRecorder: PathRecorder + Send + Sync {
         &mut self,
         slot: usize,
         level: Option<usize>,
-        (splat, first): (&Splat, FirstScatter),
+        splat: &Splat,
+        first: FirstScatter,
         levels: &MergeLevels,
     ) {
         let _ = (slot, level, splat, first, levels);
@@ -189,7 +190,8 @@ impl TileRecorder for TileRecords {
         &mut self,
         slot: usize,
         level: Option<usize>,
-        (splat, first): (&Splat, FirstScatter),
+        splat: &Splat,
+        first: FirstScatter,
         levels: &MergeLevels,
     ) {
         self.select_pixel(slot, level);

@@ -94,7 +94,7 @@ fn jobs(document: &Document) -> Result<(Vec<Job>, u64)> {
             let place = format!("{}, primitive {primitive}", named("mesh", described.name.as_deref(), mesh));
             let Some(draco) = extension::<Draco>(raw, DRACO, &place)? else { continue };
             let place = format!("{place}, {DRACO}");
-            let job = job(document, (mesh, primitive), &draco, place.clone(), &mut decoded);
+            let job = job(document, mesh, primitive, &draco, place.clone(), &mut decoded);
             if let Some((job, promised)) = job.map_err(|error: Error| error.within(place))? {
                 bytes = bytes.saturating_add(promised);
                 jobs.push(job);
@@ -108,7 +108,8 @@ fn jobs(document: &Document) -> Result<(Vec<Job>, u64)> {
 /// `decoded`, which others receive.
 fn job(
     document: &Document,
-    (mesh, primitive): (usize, usize),
+    mesh: usize,
+    primitive: usize,
     draco: &Draco,
     place: String,
     decoded: &mut HashSet<usize>,
@@ -202,7 +203,7 @@ fn apply(document: &mut Document, job: &Job, bytes: &[u8]) -> Result<()> {
             _ => return Err(broken()),
         };
         let values = take(points, component.size() * width).ok_or_else(broken)?;
-        replace(document, *index, values, points, (component, kind));
+        replace(document, *index, values, points, component, kind);
     }
     let indices = job.indices.unwrap_or_else(|| {
         // Without indices, the primitive lists its triangles' vertices in the order of the faces.
@@ -211,18 +212,12 @@ fn apply(document: &mut Document, job: &Job, bytes: &[u8]) -> Result<()> {
         document.accessors.push(Accessor { count: USize64(corners as u64), ..document.accessors[0].clone() });
         index
     });
-    replace(document, indices, faces, corners, (ComponentType::U32, Type::Scalar));
+    replace(document, indices, faces, corners, ComponentType::U32, Type::Scalar);
     Ok(())
 }
 
 /// Gives the accessor `index` decoded data, in a new buffer view.
-fn replace(
-    document: &mut Document,
-    index: usize,
-    bytes: Vec<u8>,
-    count: usize,
-    (component, kind): (ComponentType, Type),
-) {
+fn replace(document: &mut Document, index: usize, bytes: Vec<u8>, count: usize, component: ComponentType, kind: Type) {
     let view = document.views.len();
     document.views.push(View {
         buffer: Index::new(0),

@@ -172,6 +172,12 @@ fn sample_vertices(meshes: &[Arc<Mesh>], instances: &[PlacedMesh]) -> Vec<DVec3>
     points
 }
 
+/// The profiles and textures that the lights of a file share.
+pub(super) struct LightAssets<'a> {
+    pub profiles: &'a mut Profiles,
+    pub textures: &'a mut Textures,
+}
+
 /// Reads the light with index `index` in the file, for a node that is given by its name and raw JSON.
 pub(super) fn light(
     document: &Document,
@@ -179,7 +185,8 @@ pub(super) fn light(
     node: (&str, &Value),
     to_world: DAffine3,
     divisors: Divisors,
-    (profiles, textures, warnings): (&mut Profiles, &mut Textures, &mut Vec<String>),
+    LightAssets { profiles, textures }: LightAssets<'_>,
+    warnings: &mut Vec<String>,
 ) -> Result<PunctualLight> {
     let list = document.raw["extensions"]["KHR_lights_punctual"]["lights"].as_array();
     let raw = get(list.map_or(&[][..], Vec::as_slice), index, "light")?;
@@ -249,7 +256,7 @@ pub(super) fn light(
         warnings.push(format!("{place}: extras.caustique.bulb has no effect: {why}"));
     }
     if let Some(gobo) = on_node.gobo.or(on_light.gobo) {
-        profiles.apply_gobo((document, textures), &gobo, &mut light, &place, warnings)?;
+        profiles.apply_gobo(document, textures, &gobo, &mut light, &place, warnings)?;
     }
     Ok(light)
 }

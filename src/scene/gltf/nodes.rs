@@ -406,7 +406,7 @@ impl<'r> Reader<'r> {
                 && extension::<Visibility>(raw, "KHR_node_visibility", &place)?
                     .is_none_or(|visibility| visibility.visible);
             let moves = moves || moving.is_some_and(|moving| moving.moves(index));
-            self.node(index, raw, &place, to_world, (shown, moves))?;
+            self.node(index, raw, &place, to_world, shown, moves)?;
             for child in node.children.iter().flatten().rev() {
                 get(&document.nodes, child.value(), "node").map_err(|e| e.within(&place))?;
                 stack.push((child.value(), to_world, shown, moves));
@@ -424,7 +424,8 @@ impl<'r> Reader<'r> {
         raw: &Value,
         place: &str,
         to_world: DAffine3,
-        (shown, moves): (bool, bool),
+        shown: bool,
+        moves: bool,
     ) -> Result<()> {
         let document = self.document;
         let node = &document.nodes[index];
@@ -456,7 +457,7 @@ impl<'r> Reader<'r> {
             let deforms = self.deforms(mesh, index, raw);
             let owner = deform::is_deformed(raw).then_some(index);
             let parts = match self.moment {
-                Some(moment) => self.parts_at_moment(moment, (mesh, owner), &shape, deforms, &name)?,
+                Some(moment) => self.parts_at_moment(moment, mesh, owner, &shape, deforms, &name)?,
                 None => self.parts(mesh, owner, &shape)?,
             };
             let object = Object { name, extras: &extras, moves: moves || deforms };
@@ -481,11 +482,12 @@ impl<'r> Reader<'r> {
             divisors
         });
         if let Some(LightReference { light }) = reference {
-            let read = (&mut self.profiles, &mut self.library.textures, &mut out.warnings);
-            out.lights.push(lights::light(document, light as usize, node, to_world, divisors, read)?);
+            let (index, warnings) = (light as usize, &mut out.warnings);
+            let assets = lights::LightAssets { profiles: &mut self.profiles, textures: &mut self.library.textures };
+            out.lights.push(lights::light(document, index, node, to_world, divisors, assets, warnings)?);
         }
-        let read = (&mut self.profiles, &mut out.warnings);
-        out.lights.extend(profiles::light(document, node, place, to_world, divisors.point(), read)?);
+        let (divisor, profiles, warnings) = (divisors.point(), &mut self.profiles, &mut out.warnings);
+        out.lights.extend(profiles::light(document, node, place, to_world, divisor, profiles, warnings)?);
         Ok(())
     }
 
@@ -590,7 +592,8 @@ impl<'r> Reader<'r> {
     fn parts_at_moment(
         &mut self,
         Moment { shared, partial, .. }: Moment<'r>,
-        (index, owner): (usize, Option<usize>),
+        index: usize,
+        owner: Option<usize>,
         shape: &Deformation,
         deforms: bool,
         name: &str,

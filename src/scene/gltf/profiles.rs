@@ -92,7 +92,8 @@ impl Profiles {
         &mut self,
         document: &Document,
         source: Source,
-        (turn, scale): (Turn, f32),
+        turn: Turn,
+        scale: f32,
         warnings: &mut Vec<String>,
     ) -> Result<Shape> {
         let key = (source, turn.degrees.to_bits(), turn.clockwise, scale.to_bits());
@@ -150,7 +151,7 @@ impl Profiles {
             _ => return Err(fault(place, "extras.caustique.ies must have one of file and bufferView")),
         };
         let turn = Turn { degrees: extras.rotation_deg, clockwise: extras.clockwise };
-        let shape = self.get(document, source, (turn, extras.angle_scale), warnings);
+        let shape = self.get(document, source, turn, extras.angle_scale, warnings);
         let Shape { pattern, peak, flux } = shape.map_err(|error| error.within(place))?;
         light.pattern = Some(pattern);
         match extras.normalize {
@@ -172,7 +173,8 @@ impl Profiles {
     /// Gives a spot the picture that its extras name.
     pub(super) fn apply_gobo(
         &mut self,
-        (document, textures): (&Document, &mut Textures),
+        document: &Document,
+        textures: &mut Textures,
         extras: &GoboExtras,
         light: &mut PunctualLight,
         place: &str,
@@ -255,7 +257,8 @@ pub(super) fn light(
     place: &str,
     to_world: DAffine3,
     divisor: f32,
-    (profiles, warnings): (&mut Profiles, &mut Vec<String>),
+    profiles: &mut Profiles,
+    warnings: &mut Vec<String>,
 ) -> Result<Option<PunctualLight>> {
     let Some(reference) = extension::<Reference>(node.1, "EXT_lights_ies", place)? else { return Ok(None) };
     let list = document.raw["extensions"]["EXT_lights_ies"]["lights"].as_array();
@@ -285,7 +288,7 @@ pub(super) fn light(
         return Err(fault(&place, cause));
     }
     // Horizontal angles start at the X axis, and run counter-clockwise as seen from behind the light.
-    let shape = profiles.get(document, source, (Turn::default(), 0.0), warnings);
+    let shape = profiles.get(document, source, Turn::default(), 0.0, warnings);
     let Shape { pattern, peak, .. } = shape.map_err(|error| error.within(&place))?;
     let name = Some(node.0).filter(|name| !name.is_empty()).map(str::to_owned);
     Ok(Some(PunctualLight {

@@ -21,7 +21,7 @@ use crate::transport::walk::interior::{Interior, Presence};
 use crate::transport::walk::lobe_layers::{FirstScatter, LobeHistory};
 use crate::transport::walk::pass_through::{BulbHit, PassThroughHit};
 use crate::transport::walk::pixel_sample::{Features, PixelSample};
-use crate::transport::walk::scattering_vertex::ScatterPoint;
+use crate::transport::walk::scattering_vertex::{ScatterPoint, ShadowTarget};
 use crate::transport::walk::segment::{Destination, FirstHit, with_camera_bit};
 use crate::transport::walk::vertex::{MediumLight, MediumVertex, Next, Scattered, Vertex, Visitor};
 use crate::transport::walk::{PathStart, walk};
@@ -235,13 +235,13 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
         // Each pair of vertices decides about cut-outs independently.
         let bits = mix(vertex.draws().bits(Purpose::SecondAlpha).wrapping_add(u64::from(light.depth)));
         let token = with_camera_bit(camera_paths.scene, bits as u32, false);
-        let end = Some(light.shadow_end(-d, distance));
         let destination = match camera_paths.scene.alpha_solids.is_empty() {
             true => Destination::Any,
             false => Destination::Agreeing(presence.absent),
         };
-        let at_end = (light.in_medium(), light.touching());
-        let visibility = vertex.shadow_ray_to(camera_paths.scene, d, end, token, at_end, destination);
+        let (p, in_medium) = (Some(light.shadow_end(-d, distance)), light.in_medium());
+        let target = ShadowTarget { p, in_medium, reaching: light.touching(), destination };
+        let visibility = vertex.shadow_ray_to(camera_paths.scene, d, token, target);
         if !is_lit(visibility.transmittance) {
             return;
         }

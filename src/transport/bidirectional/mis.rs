@@ -310,7 +310,8 @@ pub fn connect(light: &End<'_>, camera: &End<'_>, connections: f64) -> Ratios {
 /// vertex's [`one_merge`].
 #[inline]
 pub fn merge(
-    (light, camera): (&MisState, &MisState),
+    light: &MisState,
+    camera: &MisState,
     joins: [f64; 2],
     pdf_w: f32,
     reverse_pdf_w: f32,

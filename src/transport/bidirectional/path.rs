@@ -126,7 +126,7 @@ impl<R: PathRecorder> PathTracer<'_, R> {
     }
 
     /// [`PathTracer::add`] for a light of this group that the path meets on segment `depth`.
-    fn add_hit(&mut self, history: &PathHistory, (depth, group): (u32, Group), light: Rgb, weight: f32) {
+    fn add_hit(&mut self, history: &PathHistory, depth: u32, group: Group, light: Rgb, weight: f32) {
         let (class, first) = (history.suffix.class_at_light(false), self.first(|| FirstScatter::Emit));
         self.add(Technique::Hit { camera: depth }, PathKind { class, group, first }, light, weight);
     }
@@ -238,7 +238,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
         {
             let weight = Self::weight(scattered, pdf);
             let (light, group) = (hit.throughput * radiance * weight, self.scene.lights.surface_group(&hit.surface));
-            self.add_hit(&history, (hit.depth, group), light, weight);
+            self.add_hit(&history, hit.depth, group, light, weight);
         }
     }
 
@@ -248,13 +248,13 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
 
     fn medium_light(&mut self, light: &MediumLight, scattered: Option<Scattered>) {
         let group = self.scene.lights.object_group(light.instance);
-        self.add_hit(&self.arriving(scattered), (light.depth, group), light.light, 1.0);
+        self.add_hit(&self.arriving(scattered), light.depth, group, light.light, 1.0);
     }
 
     fn bulb(&mut self, hit: &BulbHit, scattered: Option<Scattered>) {
         let history = self.arriving(scattered);
         if history.delta && !self.on_catcher {
-            self.add_hit(&history, (hit.depth, hit.group), hit.light, 1.0);
+            self.add_hit(&history, hit.depth, hit.group, hit.light, 1.0);
         }
     }
 

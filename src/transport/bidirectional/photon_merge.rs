@@ -163,7 +163,7 @@ impl Merge<'_> {
             finite &= value.is_finite();
             let shares = photon_shares.shares(photon.prefix, photon.wi, f);
             let reverse = shading.reverse_pdf(photon.wi, Transport::Importance, LobeSet::ALL);
-            let ratios = mis::merge((&photon.mis(), self.mis), [1.0, self.joins], pdf, reverse, self.own);
+            let ratios = mis::merge(&photon.mis(), self.mis, [1.0, self.joins], pdf, reverse, self.own);
             let technique = Technique::Merge { light: u32::from(photon.depth), camera: vertex.depth };
             record.contribution(technique, value, photon.p, ratios);
             let here = || vertex.first_scatter(photon.wi, Transport::Radiance, LobeSet::ALL, f);

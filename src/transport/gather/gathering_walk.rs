@@ -130,7 +130,8 @@ impl<B: GatherBandwidths> GatheringWalk<'_, B> {
         &mut self,
         arriving: Rgb,
         pdf_light: f32,
-        (scattered, seen): (Option<Scattered>, FirstScatter),
+        scattered: Option<Scattered>,
+        seen: FirstScatter,
         density: impl FnOnce() -> Option<EmissionDensity>,
     ) {
         if self.paths && self.scattered_broadly && scattered.is_some_and(|s| !s.lobe.intersects(LobeSet::BROAD)) {
@@ -300,7 +301,7 @@ impl<'a, B: GatherBandwidths> Visitor<'a> for GatheringWalk<'_, B> {
         let (lights, materials, from) = (&self.scene.lights, &self.scene.materials, self.last);
         if let Some((radiance, pdf)) = lights.hit_radiance(materials, &from, surface, vertex.wo) {
             let density = || Some(lights.emitted(materials, &from, surface, vertex.wo)?.1);
-            self.hit_light(vertex.throughput * radiance, pdf, (scattered, FirstScatter::Emit), density);
+            self.hit_light(vertex.throughput * radiance, pdf, scattered, FirstScatter::Emit, density);
         }
         self.last = vertex.receiver();
         let lobes = shading.bsdf.lobes();
@@ -322,11 +323,12 @@ impl<'a, B: GatherBandwidths> Visitor<'a> for GatheringWalk<'_, B> {
         }
         if vertex.depth < self.max_depth {
             let survival = if onward.is_empty() { 0.0 } else { vertex.survival(onward) };
-            let lit = self.lit_lobes(broad, onward);
-            if lit != (LobeSet::empty(), LobeSet::empty()) {
+            let (lit, lit_onward) = self.lit_lobes(broad, onward);
+            if !(lit | lit_onward).is_empty() {
                 let scene = self.scene;
-                let find = |lobes: Division<'_>| divided_direct_light(scene, vertex, lit, survival, lobes);
-                self.add_direct(vertex.throughput, find);
+                self.add_direct(vertex.throughput, |lobes: Division<'_>| {
+                    divided_direct_light(scene, vertex, lit, lit_onward, survival, lobes)
+                });
             }
             self.gather(vertex, broad, Onward { lobes: onward, probability: survival });
         }
@@ -340,7 +342,7 @@ impl<'a, B: GatherBandwidths> Visitor<'a> for GatheringWalk<'_, B> {
         self.suffix = self.suffix_on_arrival(scattered);
         if let Some((radiance, pdf)) = lights.hit_radiance(materials, &from, &hit.surface, hit.wo) {
             let density = || Some(lights.emitted(materials, &from, &hit.surface, hit.wo)?.1);
-            self.hit_light(hit.throughput * radiance, pdf, (scattered, FirstScatter::Emit), density);
+            self.hit_light(hit.throughput * radiance, pdf, scattered, FirstScatter::Emit, density);
         }
         self.suffix = before;
     }
@@ -349,7 +351,7 @@ impl<'a, B: GatherBandwidths> Visitor<'a> for GatheringWalk<'_, B> {
         let before = self.suffix;
         self.suffix = self.suffix_on_arrival(scattered);
         if matches!(self.suffix.class_at_light(false), PathClass::Emission | PathClass::Coat) {
-            self.hit_light(hit.light, 0.0, (scattered, FirstScatter::Emit), || None);
+            self.hit_light(hit.light, 0.0, scattered, FirstScatter::Emit, || None);
         }
         self.suffix = before;
     }
@@ -414,7 +416,7 @@ impl<'a, B: GatherBandwidths> Visitor<'a> for GatheringWalk<'_, B> {
             let onward = || scene.lights.entry_pdf_a(last.p, direction);
             let density =
                 || Some(EmissionDensity { direct, start, onward: onward(), cos: 1.0, infinite: true, delta: false });
-            self.hit_light(throughput * radiance, direct, (scattered, FirstScatter::Environment), density);
+            self.hit_light(throughput * radiance, direct, scattered, FirstScatter::Environment, density);
         });
     }
 

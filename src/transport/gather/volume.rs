@@ -127,7 +127,7 @@ mod tests {
     /// of flux times length, spread evenly over the unit cube and over all directions, is a fluence of 1. A normalised
     /// phase function scatters 1 / (4 pi) of it into every direction, for all bandwidths and orders of levels.
     /// `roughness` is the integral of the squared kernel over that of the box; `fault` is a factor of the result.
-    fn deviation(map: &PhotonMap<VolumePhoton>, (kernel, roughness): (Kernel, f32), fault: f32) -> f32 {
+    fn deviation(map: &PhotonMap<VolumePhoton>, kernel: Kernel, roughness: f32, fault: f32) -> f32 {
         let bandwidths = [0.4f32, 0.1, 0.2, 0.15, 0.3];
         let volume = Volume::new(map, bandwidths.into_iter());
         let mut worst = 0f32;
@@ -153,10 +153,11 @@ mod tests {
         let map =
             PhotonMap::build((0..PHOTONS).map(|i| photon(i, 7)).chain((0..PHOTONS).map(|i| photon(i, 8))).collect());
         let kernels = [(Kernel::Box, 1.0), (Kernel::Epanechnikov, 10.0 / 7.0), (Kernel::Gaussian, 2.69)];
-        let right = kernels.map(|kernel| deviation(&map, kernel, 1.0));
+        let right = kernels.map(|(kernel, roughness)| deviation(&map, kernel, roughness, 1.0));
         assert!(right.iter().all(|&worst| worst < 5.0), "{right:?}");
         let of_disc = |kernel: Kernel| kernel.weight(0.0) / kernel.ball_weight(0.0);
-        let flat = [kernels[1], kernels[2]].map(|kernel| deviation(&map, kernel, of_disc(kernel.0)));
+        let flat =
+            [kernels[1], kernels[2]].map(|(kernel, roughness)| deviation(&map, kernel, roughness, of_disc(kernel)));
         assert!(flat.iter().all(|&worst| worst > 5.0), "a disc's normalisation goes unnoticed: {flat:?}");
     }
 }

@@ -3,8 +3,8 @@
 pub(in crate::transport) mod vertex_counts;
 
 use crate::bsdf::{LobeSet, Transport};
-use crate::light::{EmissionDensity, Emitter, Guide, Region, VolumeLight, guide};
-use crate::math::{DVec2, DVec3, Rgb, Vec2};
+use crate::light::{EmissionDensity, EmissionDraws, Emitter, Guide, Region, VolumeLight, guide};
+use crate::math::{DVec2, DVec3, Rgb};
 use crate::path_class::ClassSet;
 use crate::photon::{ByKind, Kind, Photon, PhotonFlags, PhotonTag, ThinningKey, VolumePhoton};
 use crate::random::{Domain, GOLDEN, Purpose, SobolPair, Stream, Streams, mix};
@@ -62,14 +62,6 @@ pub struct Emitted {
     pub weight: f32,
     /// Fraction of the density of the start that is not aimed at objects that make caustics, 0 to 1.
     pub unaimed: f32,
-}
-
-/// Random numbers of the emission of a light path.
-struct EmissionDraws {
-    /// Choice of the light, and of the target that it is aimed at.
-    choice: DVec2,
-    point: Vec2,
-    direction: Vec2,
 }
 
 impl<'a> LightPaths<'a> {
@@ -184,15 +176,16 @@ impl<'a> LightPaths<'a> {
         scene: &Scene,
         initial_media: &InitialMedia,
         stream: Stream,
-        EmissionDraws { choice, point, direction }: EmissionDraws,
+        draws: EmissionDraws,
     ) -> Option<Emitted> {
         let (lights, shapes, materials) = (&scene.lights, &scene.shapes, &scene.materials);
         let (emission, cell, ratio, weight, unaimed) = match self.guide {
             Some(guide) => {
-                let guided = guide.emit(lights, shapes, materials, self.region, (choice, point, direction))?;
+                let guided = guide.emit(lights, shapes, materials, self.region, draws)?;
                 (guided.emission, guided.cell, guided.ratio, guided.weight, guided.unaimed)
             }
             None => {
+                let EmissionDraws { choice, point, direction } = draws;
                 let mut emission = lights.sample_emission(shapes, materials, choice.x, point, direction)?;
                 lights.aim_with_region(&mut emission, self.region, choice.y as f32, point);
                 let (mixed, unaimed) = lights.density_with_region(&emission, self.region);

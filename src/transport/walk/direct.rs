@@ -40,7 +40,7 @@ pub fn balance(pdf: f32, other: f32) -> f32 {
 pub(in crate::transport) type Division<'d> = Option<&'d mut [Rgb; 3]>;
 
 /// Adds `light`, which the lobes of `set` scatter from `wi` with the value `f`, to the lobes of a surface.
-fn divide<S: ScatterPoint>(into: &mut [Rgb; 3], vertex: &S, wi: Vec3, (set, f): (LobeSet, Rgb), light: Rgb) {
+fn divide<S: ScatterPoint>(into: &mut [Rgb; 3], vertex: &S, wi: Vec3, set: LobeSet, f: Rgb, light: Rgb) {
     if let FirstScatter::Surface(shares) = vertex.first_scatter(wi, Transport::Radiance, set, f) {
         into.iter_mut().zip(shares).for_each(|(sum, share)| *sum += light * share);
     }
@@ -50,7 +50,7 @@ fn divide<S: ScatterPoint>(into: &mut [Rgb; 3], vertex: &S, wi: Vec3, (set, f): 
 /// probability `survival`.
 #[inline]
 pub fn direct_light(scene: &Scene, vertex: &impl ScatterPoint, gather: LobeSet, onward: LobeSet, survival: f32) -> Rgb {
-    divided_direct_light(scene, vertex, (gather, onward), survival, None)
+    divided_direct_light(scene, vertex, gather, onward, survival, None)
 }
 
 /// [`direct_light`] that also adds the light to the lobes of the vertex.
@@ -58,7 +58,8 @@ pub fn direct_light(scene: &Scene, vertex: &impl ScatterPoint, gather: LobeSet, 
 pub(in crate::transport) fn divided_direct_light(
     scene: &Scene,
     vertex: &impl ScatterPoint,
-    (gather, onward): (LobeSet, LobeSet),
+    gather: LobeSet,
+    onward: LobeSet,
     survival: f32,
     mut lobes: Division<'_>,
 ) -> Rgb {
@@ -110,7 +111,7 @@ pub(in crate::transport) fn next_event(
         for (set, probability) in sets.into_iter().filter(|(set, _)| set.intersects(LobeSet::SMOOTH)) {
             let (f, pdf) = vertex.evaluate_cos(sample.wi, Transport::Radiance, set);
             let weight = if sample.delta { 1.0 } else { balance(sample.pdf_w, probability * pdf) };
-            divide(lobes, vertex, sample.wi, (set, f), f * weight * arriving);
+            divide(lobes, vertex, sample.wi, set, f, f * weight * arriving);
         }
     }
     arriving * left
@@ -172,7 +173,7 @@ fn bsdf_sample<S: ScatterPoint>(scene: &Scene, vertex: &S, set: LobeSet, lobes: 
     });
     if let (Some(lobes), true) = (lobes, is_lit(light)) {
         let (f, _) = vertex.evaluate_cos(sample.wi, Transport::Radiance, set);
-        divide(lobes, vertex, sample.wi, (set, f), sample.weight * light);
+        divide(lobes, vertex, sample.wi, set, f, sample.weight * light);
     }
     sample.weight * light
 }

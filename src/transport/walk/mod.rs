@@ -442,12 +442,12 @@ impl<'a> Path<'a> {
             && set == LobeSet::DELTA
             && let Some(branches) = shading.interface_branches(transport)
         {
-            self.split_interface::<V, BESIDES>(&vertex, branches, (going, scale), visitor);
+            self.split_interface::<V, BESIDES>(&vertex, branches, going, scale, visitor);
             return Some(());
         }
         let lobe = draws.one_if(shading.bsdf.has_several_lobes(), Purpose::Lobe);
         let sample = shading.sample(transport, set, lobe, draws.two(Purpose::Direction))?;
-        self.leave(&vertex, &sample, (going, scale), visitor);
+        self.leave(&vertex, &sample, going, scale, visitor);
         Some(())
     }
 
@@ -458,7 +458,8 @@ impl<'a> Path<'a> {
         &mut self,
         vertex: &Vertex<'_, 'a>,
         sample: &BsdfSample,
-        (going, scale): (f32, f32),
+        going: f32,
+        scale: f32,
         visitor: &mut V,
     ) {
         visitor.scatter(vertex, sample);
@@ -485,27 +486,28 @@ impl<'a> Path<'a> {
         &mut self,
         vertex: &Vertex<'_, 'a>,
         [weak, strong]: [BsdfSample; 2],
-        (going, scale): (f32, f32),
+        going: f32,
+        scale: f32,
         visitor: &mut V,
     ) {
         self.splits -= 1;
         let share = branch_share(self.share, weak.pdf_w);
         if !vertex.draws.happens(weak.pdf_w / share, Purpose::Lobe) {
-            return self.leave(vertex, &strong, (going, scale), visitor);
+            return self.leave(vertex, &strong, going, scale, visitor);
         }
         if share == 1.0 {
-            return self.leave(vertex, &weak, (going, scale), visitor);
+            return self.leave(vertex, &weak, going, scale, visitor);
         }
         let mut branch = *self;
         branch.stream = self.stream.branch(self.depth, 0);
         branch.take_share(share);
         visitor.branch(|visitor| {
-            branch.leave(vertex, &weak, (going, scale), visitor);
+            branch.leave(vertex, &weak, going, scale, visitor);
             branch.depth += 1;
             branch.follow_branch::<V, BESIDES>(&PrecomputedHit::Unknown, visitor);
         });
         self.take_share(1.0 - share);
-        self.leave(vertex, &strong, (going, scale), visitor);
+        self.leave(vertex, &strong, going, scale, visitor);
     }
 
     /// Reduces the path to a branch that has the fraction `share` of its weight. Roulette does not treat this as a loss.
@@ -615,7 +617,7 @@ fn visit_pass_through_lights<'a, V: Visitor<'a>>(scene: &Scene, segment: &Segmen
 fn visit_bulbs<'a, V: Visitor<'a>>(scene: &Scene, segment: &Segment<'_>, draws: Draws, visitor: &mut V) {
     let Segment { start, end, from_medium, throughput, depth, scattered } = *segment;
     let reach = if let End::Surface(arrival) = end { arrival.distance } else { f32::INFINITY };
-    for_each_bulb(scene, start, reach, (from_medium, depth == 1), draws, |radiance, at, group| {
+    for_each_bulb(scene, start, reach, from_medium, depth == 1, draws, |radiance, at, group| {
         visitor.bulb(&BulbHit { light: throughput * radiance, group, depth, at }, scattered);
     });
 }

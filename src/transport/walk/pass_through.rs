@@ -78,13 +78,14 @@ pub(in crate::transport) fn for_each_bulb(
     scene: &Scene,
     start: &Start,
     reach: f32,
-    (from_medium, camera): (bool, bool),
+    from_medium: bool,
+    camera: bool,
     draws: Draws,
     mut each: impl FnMut(Rgb, Vec3, Group),
 ) {
     // Media attenuate the light of the bulb's points differently.
     let u = if scene.survey.media { draws.one(Purpose::Bulb) } else { 0.5 };
-    scene.lights.for_each_bulb((start.origin, start.direction), reach, camera, u, |radiance, distance, group| {
+    scene.lights.for_each_bulb(start.origin, start.direction, reach, camera, u, |radiance, distance, group| {
         let between = ShadowRay {
             start: *start,
             tmax: distance,

@@ -15,6 +15,26 @@ use crate::scene::contact::{self, ContactPoint};
 use crate::spectrum::Wavelength;
 use crate::trace::Ray;
 
+/// The end of a shadow ray.
+#[derive(Clone, Copy)]
+pub struct ShadowTarget {
+    /// Position; `None`: the ray leaves the scene.
+    pub p: Option<Vec3>,
+    /// Whether a vertex in a medium lies there.
+    pub in_medium: bool,
+    /// The point on its surface, if other surfaces touch it there.
+    pub reaching: Option<ContactPoint>,
+    /// The solids in which the ray must arrive.
+    pub destination: Destination,
+}
+
+impl ShadowTarget {
+    /// A point on no surface of its own.
+    fn at(p: Option<Vec3>) -> ShadowTarget {
+        ShadowTarget { p, in_medium: false, reaching: None, destination: Destination::Any }
+    }
+}
+
 /// A vertex of a walk, on a surface or in a medium. In a medium the cosine is 1, and the phase function counts as a
 /// broad lobe.
 pub trait ScatterPoint {
@@ -78,7 +98,7 @@ pub trait ScatterPoint {
     /// Traces a shadow ray along `wi` to `target` (`None`: out of the scene).
     #[inline]
     fn shadow_ray(&self, scene: &Scene, wi: Vec3, target: Option<Vec3>, token: u32) -> Visibility {
-        self.shadow_ray_to(scene, wi, target, token, (false, None), Destination::Any)
+        self.shadow_ray_to(scene, wi, token, ShadowTarget::at(target))
     }
 
     /// Samples a light for next-event estimation.
@@ -98,26 +118,20 @@ pub trait ScatterPoint {
             Some(Emitter::Volume(VolumeLight { instance, .. })) if scene.survey.fire => Destination::Inside(*instance),
             _ => Destination::Any,
         };
-        self.shadow_ray_to(scene, light.wi, light.target, token, (false, reaching), destination)
+        let target = ShadowTarget { reaching, destination, ..ShadowTarget::at(light.target) };
+        self.shadow_ray_to(scene, light.wi, token, target)
     }
 
-    /// Traces a shadow ray to a vertex, which may lie in a medium, or to a point on a surface on which others lie.
+    /// Traces a shadow ray along `wi` to its target.
     #[inline]
-    fn shadow_ray_to(
-        &self,
-        scene: &Scene,
-        wi: Vec3,
-        target: Option<Vec3>,
-        token: u32,
-        (to_medium, reaching): (bool, Option<ContactPoint>),
-        destination: Destination,
-    ) -> Visibility {
+    fn shadow_ray_to(&self, scene: &Scene, wi: Vec3, token: u32, target: ShadowTarget) -> Visibility {
+        let ShadowTarget { p, in_medium, reaching, destination } = target;
         let origin = self.ray_origin(wi);
-        let (direction, tmax) = match target {
+        let (direction, tmax) = match p {
             None => (wi, f32::INFINITY),
-            Some(target) => {
+            Some(p) => {
                 // Both ends are offset from their surfaces.
-                let to = target - origin;
+                let to = p - origin;
                 let distance = to.length();
                 (to / distance, distance)
             }
@@ -129,7 +143,7 @@ pub trait ScatterPoint {
         }
         let interior = *self.interiors()[usize::from(self.crosses(wi))];
         let start = Start { origin, direction, interior, leaving, token };
-        let in_medium = [Self::IN_MEDIUM, to_medium];
+        let in_medium = [Self::IN_MEDIUM, in_medium];
         shadow_ray(scene, &ShadowRay { start, tmax, reaching, in_medium, destination, to_lens: true })
     }
 }

@@ -147,18 +147,18 @@ impl Through for Attenuate<'_> {
     #[inline]
     fn pass(&mut self, span: &Span) -> Passage {
         Passage::Left(match span.grid_ray(self.scene) {
-            Some(ray) => attenuation(&ray, &span.medium, span.distance, (self.token, span.crossed)),
+            Some(ray) => attenuation(&ray, &span.medium, span.distance, self.token, span.crossed),
             None => span.medium.transmittance(span.distance),
         })
     }
 }
 
-/// An unbiased estimate of the transmittance of part number `crossed` of a ray with these random bits, over `distance`
+/// An unbiased estimate of the transmittance of part number `crossed` of a ray with this token, over `distance`
 /// (m) in a heterogeneous medium.
 #[cold]
 #[inline(never)]
-fn attenuation(ray: &GridRay<'_>, medium: &MediumParameters, distance: f32, (bits, crossed): (u32, u32)) -> Rgb {
-    let key = mix(u64::from(bits) << 32 | u64::from(crossed));
+fn attenuation(ray: &GridRay<'_>, medium: &MediumParameters, distance: f32, token: u32, crossed: u32) -> Rgb {
+    let key = mix(u64::from(token) << 32 | u64::from(crossed));
     ray.transmittance(medium.sigma_t(), distance, &mut HashSequence::new(key))
 }
 
@@ -387,10 +387,10 @@ impl Visibility {
     #[cold]
     #[inline(never)]
     fn through(self, scene: &Scene, part: RayPart<'_>, starts: bool, ends: bool) -> Visibility {
-        let RayPart { interior, origin, direction, distance, random } = part;
-        let Some(medium) = medium(scene, interior, random.0) else { return self };
+        let RayPart { interior, origin, direction, distance, token, crossed } = part;
+        let Some(medium) = medium(scene, interior, token) else { return self };
         if let Some(ray) = interior.grid_ray(scene, origin, direction) {
-            let transmittance = self.transmittance * attenuation(&ray, &medium, distance, random);
+            let transmittance = self.transmittance * attenuation(&ray, &medium, distance, token, crossed);
             let flight = ray.flight_density(self.flight, &medium, distance, starts, ends);
             return Visibility { transmittance, flight };
         }
@@ -409,8 +409,10 @@ struct RayPart<'i> {
     direction: Vec3,
     /// Length of the part (m); may be infinite.
     distance: f32,
-    /// Random bits of the ray, and the number of its parts before this one.
-    random: (u32, u32),
+    /// Random bits of the ray.
+    token: u32,
+    /// Number of the ray's parts before this one.
+    crossed: u32,
 }
 
 /// The solids in which a shadow ray must arrive at its end. Otherwise it counts as blocked.
@@ -471,7 +473,8 @@ pub fn shadow_ray(scene: &Scene, between: &ShadowRay) -> Visibility {
         return Visibility::BLOCKED;
     }
     let mut visibility = Visibility::CLEAR;
-    visibility.pass(scene, RayPart { interior, origin, direction, distance: tmax, random: (token, 0) }, starts, ends);
+    let part = RayPart { interior, origin, direction, distance: tmax, token, crossed: 0 };
+    visibility.pass(scene, part, starts, ends);
     visibility
 }
 
@@ -483,10 +486,10 @@ fn trace_through_boundaries(scene: &Scene, between: &ShadowRay) -> Visibility {
     let mut visibility = Visibility::CLEAR;
     let [mut starts, ends] = between.in_medium;
     for crossed in 0..MAX_NULL_CROSSINGS {
-        let (before, random) = (along.ray().origin, (token, crossed));
+        let before = along.ray().origin;
         let Some((mut surface, t)) = along.next(scene, !interior.is_open()) else {
             let distance = along.ray().tmax.max(0.0);
-            let part = RayPart { interior: &interior, origin: before, direction, distance, random };
+            let part = RayPart { interior: &interior, origin: before, direction, distance, token, crossed };
             visibility.pass(scene, part, starts, ends);
             if to_lens && passes_hidden_solids(scene, token) {
                 visibility.transmittance *= interior.seen_radiance(scene);
@@ -503,7 +506,7 @@ fn trace_through_boundaries(scene: &Scene, between: &ShadowRay) -> Visibility {
             return if between.destination.admits(scene, &interior) { visibility } else { Visibility::BLOCKED };
         };
         if t > 0.0 {
-            let part = RayPart { interior: &interior, origin: before, direction, distance: t, random };
+            let part = RayPart { interior: &interior, origin: before, direction, distance: t, token, crossed };
             visibility.pass(scene, part, starts, false);
             starts = false;
         }

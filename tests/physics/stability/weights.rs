@@ -98,7 +98,7 @@ impl Chain {
             if by_light(m) != Merges::ZERO && by_camera(m) != Merges::ZERO {
                 let own = one_merge(m + 1 == k);
                 all.push(
-                    mis::merge((&lights[m], &eyes[m]), [joins(m + 1), joins(k - m)], to_light(m), to_eye(m), own)
+                    mis::merge(&lights[m], &eyes[m], [joins(m + 1), joins(k - m)], to_light(m), to_eye(m), own)
                         .merge_weight(eta),
                 );
             }
