@@ -6,7 +6,7 @@
 
 use super::{Cdf, EmissionSample, EntryDisc, Region, Sky};
 use crate::geometry::Shapes;
-use crate::material::Materials;
+use crate::material::Objects;
 use crate::math::{Frame, Vec2, Vec3, bounding_box, warp};
 use std::f32::consts::PI;
 
@@ -129,24 +129,25 @@ fn merged_spheres(mut spheres: Vec<(Vec3, f32)>, most: usize) -> Vec<(Vec3, f32)
 
 impl CausticTargets {
     /// Finds the caustic targets of a scene from its objects and their materials.
-    pub fn new(shapes: &Shapes, materials: &Materials) -> CausticTargets {
-        CausticTargets::find(shapes, materials, |instance| sphere_of(shapes, instance))
+    pub fn new(objects: Objects<'_>) -> CausticTargets {
+        CausticTargets::find(objects, |instance| sphere_of(objects.shapes, instance))
     }
 
     /// The targets at another moment of a moving scene.
-    pub fn at_moment(&self, shapes: &Shapes, materials: &Materials) -> CausticTargets {
+    pub fn at_moment(&self, objects: Objects<'_>) -> CausticTargets {
+        let shapes = objects.shapes;
         let known = |instance: usize| self.instances.get(instance).copied().flatten();
-        CausticTargets::find(shapes, materials, |instance| match known(instance) {
+        CausticTargets::find(objects, |instance| match known(instance) {
             Some(sphere) if !shapes.instances[instance].moves => Some(sphere),
             _ => sphere_of(shapes, instance),
         })
     }
 
     /// Finds the caustic targets, where `sphere` gives the bounding sphere of an instance.
-    fn find(shapes: &Shapes, materials: &Materials, sphere: impl Fn(usize) -> Option<(Vec3, f32)>) -> CausticTargets {
-        let focuses = |i: &usize| materials.list[shapes.instances[*i].material as usize].focuses();
-        let instances: Vec<_> =
-            (0..shapes.instances.len()).map(|i| Some(i).filter(focuses).and_then(&sphere)).collect();
+    fn find(objects: Objects<'_>, sphere: impl Fn(usize) -> Option<(Vec3, f32)>) -> CausticTargets {
+        let all = &objects.shapes.instances;
+        let focuses = |i: &usize| objects.material(&all[*i]).focuses();
+        let instances: Vec<_> = (0..all.len()).map(|i| Some(i).filter(focuses).and_then(&sphere)).collect();
         let spheres: Vec<(Vec3, f32)> = instances.iter().copied().flatten().collect();
         let spheres = merged_spheres(spatially_merged(spheres, MAX_SPHERES), MAX_TARGETS);
         let areas = spheres.iter().map(|s| PI * s.1 * s.1);

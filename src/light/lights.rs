@@ -14,7 +14,7 @@ use super::receiver::Receiver;
 use super::sampler::LightSampler;
 use super::sky::Sky;
 use crate::geometry::{Shapes, Surface};
-use crate::material::Materials;
+use crate::material::{Materials, Objects};
 use crate::math::{Rgb, Vec2, Vec3};
 use std::f32::consts::PI;
 use std::ops::Range;
@@ -43,23 +43,17 @@ pub struct Lights {
 
 impl Lights {
     /// Lists the emissive triangles of the shapes, then `others` (points, spots, suns), then the environment.
-    pub fn new(shapes: &Shapes, materials: &Materials, others: Vec<Emitter>, sky: Sky) -> Lights {
-        Lights::build(shapes, materials, others, sky, CausticTargets::new(shapes, materials))
+    pub fn new(objects: Objects<'_>, others: Vec<Emitter>, sky: Sky) -> Lights {
+        Lights::build(objects, others, sky, CausticTargets::new(objects))
     }
 
     /// The lights at another moment of a moving scene, with the present light groups. The distributions that select
     /// lights are shared if `changed` is false: no light, no material and not the bounding sphere has changed.
     #[must_use]
-    pub fn at_moment(
-        &self,
-        (shapes, materials): (&Shapes, &Materials),
-        others: Vec<Emitter>,
-        sky: Sky,
-        changed: bool,
-    ) -> Lights {
-        let targets = self.targets.at_moment(shapes, materials);
+    pub fn at_moment(&self, objects: Objects<'_>, others: Vec<Emitter>, sky: Sky, changed: bool) -> Lights {
+        let targets = self.targets.at_moment(objects);
         if changed {
-            return Lights::build(shapes, materials, others, sky, targets).with_groups(self.groups.clone());
+            return Lights::build(objects, others, sky, targets).with_groups(self.groups.clone());
         }
         Lights {
             emitters: Arc::clone(&self.emitters),
@@ -74,18 +68,13 @@ impl Lights {
         }
     }
 
-    fn build(
-        shapes: &Shapes,
-        materials: &Materials,
-        others: Vec<Emitter>,
-        sky: Sky,
-        targets: CausticTargets,
-    ) -> Lights {
+    fn build(objects: Objects<'_>, others: Vec<Emitter>, sky: Sky, targets: CausticTargets) -> Lights {
         let mut emitters = Vec::new();
-        let mut first = vec![u32::MAX; shapes.instances.len()];
-        let mut relative = vec![Vec::new(); shapes.instances.len()];
-        for (i, instance) in shapes.instances.iter().enumerate() {
-            let material = &materials.list[instance.material as usize];
+        let instances = &objects.shapes.instances;
+        let mut first = vec![u32::MAX; instances.len()];
+        let mut relative = vec![Vec::new(); instances.len()];
+        for (i, instance) in instances.iter().enumerate() {
+            let material = objects.material(instance);
             let grids = material.grids.as_ref().filter(|_| material.medium_emission().is_some());
             if let (Some(grids), Some(placement)) = (grids, &instance.to_world) {
                 let (instance, grids, to_world) = (i as u32, Arc::clone(grids), placement.points);
@@ -95,8 +84,8 @@ impl Lights {
                 continue;
             }
             first[i] = emitters.len() as u32;
-            for primitive in 0..shapes.meshes[instance.mesh as usize].triangles.len() as u32 {
-                let emitter = TriangleLight::new(shapes, materials, i as u32, primitive);
+            for primitive in 0..objects.mesh(instance).triangles.len() as u32 {
+                let emitter = TriangleLight::new(objects, i as u32, primitive);
                 relative[i].push(emitter.as_ref().map_or(u32::MAX, |_| emitters.len() as u32 - first[i]));
                 emitters.extend(emitter.map(Emitter::from));
             }

@@ -3,11 +3,13 @@
 mod evaluate;
 mod input;
 mod library;
+mod objects;
 mod scattering;
 
 pub use crate::medium::{EmissionGrid, MediumGrids, MediumParameters};
 pub use input::Input;
 pub use library::{MAX_FOCUSING_ROUGHNESS, Materials};
+pub use objects::Objects;
 pub use scattering::Scattering;
 
 use crate::bsdf::SheenModel;

@@ -9,7 +9,7 @@ use crate::light::{
     Bulb, Distribution, Emitter, Environment, Group, Groups, ImageEnvironment, Light, LightPlacement, Lights,
     MAX_GROUP_NAME, MAX_GROUPS, Pattern, PointLight, ShapedLight, Sky, SpotCone,
 };
-use crate::material::{Alpha, Material, Materials, MediumParameters, Scattering};
+use crate::material::{Alpha, Material, Materials, MediumParameters, Objects, Scattering};
 use crate::math::{DAffine3, DVec3, Rgb, Vec3, bounding_box};
 use crate::texture::Texture;
 use crate::trace::{CAMERA_RAY_BIT, HitFilter, Tracer};
@@ -46,6 +46,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     let mut materials = Materials { list: description.materials, textures: description.textures.into() };
     dense::limit_densities(&shapes, &mut materials, &mut description.medium, &mut warnings);
     let materials = Arc::new(materials);
+    let objects = Objects { shapes: &shapes, materials: &materials };
     let (tracer, pass_through_lights) = tracers(&shapes, &materials, threads)?;
     let catchers = catchers(&shapes, &materials, threads)?;
     // The picture is laid over a photograph.
@@ -62,10 +63,10 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     let mut distributions = Distributions::default();
     let (light_names, others) =
         others.map(|light| (light.name.clone(), punctual(light, origin, &mut distributions))).unzip();
-    let lights = Lights::new(&shapes, &materials, others, sky).with_groups(groups);
-    warn_of_cut_solids(&shapes, &materials, &mut warnings);
-    warn_of_fires((&shapes, &materials), &mut warnings);
-    warn_of_lights((&shapes, &materials), &lights, description.medium, &mut warnings);
+    let lights = Lights::new(objects, others, sky).with_groups(groups);
+    warn_of_cut_solids(objects, &mut warnings);
+    warn_of_fires(objects, &mut warnings);
+    warn_of_lights(objects, &lights, description.medium, &mut warnings);
     // With motion blur, lights that are dark at the frame may shine at another moment.
     if lights.is_empty() && !(shutter.is_some() && description.has_light) {
         warnings.push(black_warning(description.lights.len()));
@@ -75,11 +76,11 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
             .push("the scene has no camera: a three-quarter view of the whole scene is used (--orbit turns it)".into());
     }
     let scattering = Scattering::new(&materials.list);
-    let contacts = Arc::new(Contacts::new(&shapes, &materials));
+    let contacts = Arc::new(Contacts::new(objects));
     warn_of_thin_walls(&shapes, &contacts, &mut warnings);
-    let survey = Survey::new(&shapes, &materials, &lights, description.medium);
-    let ranks = Volumes::of(&shapes, &materials).ranks(&shapes);
-    let alpha_solids = alpha_solids(&shapes, &materials).into();
+    let survey = Survey::new(objects, &lights, description.medium);
+    let ranks = Volumes::of(objects).ranks(&shapes);
+    let alpha_solids = alpha_solids(objects).into();
     Ok(Scene {
         source: description.source,
         files: description.files,
@@ -173,12 +174,11 @@ fn light_groups(description: &Description, first_light_sphere: u32, warnings: &m
 /// Adds a warning for each glass solid with alpha, which is only approximated. If alpha varies over the solid, the
 /// alpha where a ray enters also decides at its exit, so reversed paths may differ. If an emissive solid has alpha,
 /// each face decides by itself, so that light samples and hits agree, and a ray may pass one wall of the solid alone.
-fn warn_of_cut_solids(shapes: &Shapes, materials: &Materials, warnings: &mut Vec<String>) {
-    let mut named = vec![false; materials.list.len()];
-    for instance in &shapes.instances {
-        let material = &materials.list[instance.material as usize];
-        let colors = &shapes.meshes[instance.mesh as usize].colors;
-        let texture = material.base_color_texture.map(|t| &materials.textures[t.texture as usize]);
+fn warn_of_cut_solids(objects: Objects<'_>, warnings: &mut Vec<String>) {
+    let mut named = vec![false; objects.materials.list.len()];
+    for instance in &objects.shapes.instances {
+        let (material, colors) = (objects.material(instance), &objects.mesh(instance).colors);
+        let texture = material.base_color_texture.map(|t| &objects.materials.textures[t.texture as usize]);
         let varies = || texture.is_some_and(Texture::has_alpha) || colors.iter().any(|color| color.w < 1.0);
         let opaque_from = if let Alpha::Mask(cutoff) = material.alpha { cutoff } else { 1.0 };
         let glows = material.is_solid() && material.emits() && material.alpha != Alpha::Opaque;
@@ -196,10 +196,10 @@ fn warn_of_cut_solids(shapes: &Shapes, materials: &Materials, warnings: &mut Vec
 }
 
 /// Adds a warning for each object whose medium emits light outside of its mesh, where it does not exist.
-fn warn_of_fires((shapes, materials): (&Shapes, &Materials), warnings: &mut Vec<String>) {
-    for instance in &shapes.instances {
-        let Some(emission) = materials.list[instance.material as usize].medium_emission() else { continue };
-        let (low, high) = bounding_box(shapes.meshes[instance.mesh as usize].positions.iter().copied());
+fn warn_of_fires(objects: Objects<'_>, warnings: &mut Vec<String>) {
+    for instance in &objects.shapes.instances {
+        let Some(emission) = objects.material(instance).medium_emission() else { continue };
+        let (low, high) = bounding_box(objects.mesh(instance).positions.iter().copied());
         let [from, to] = emission.grid().bounds();
         let tolerance = MAX_FIRE_OUTSIDE * (to - from);
         if (from + tolerance).cmplt(low).any() || (to - tolerance).cmpgt(high).any() {
@@ -225,14 +225,9 @@ fn black_warning(punctual: usize) -> String {
 }
 
 /// Adds warnings about lights without effect.
-fn warn_of_lights(
-    (shapes, materials): (&Shapes, &Materials),
-    lights: &Lights,
-    medium: Option<MediumParameters>,
-    warnings: &mut Vec<String>,
-) {
-    for (i, instance) in shapes.instances.iter().enumerate() {
-        if materials.list[instance.material as usize].emits() && !lights.emits(i as u32) {
+fn warn_of_lights(objects: Objects<'_>, lights: &Lights, medium: Option<MediumParameters>, warnings: &mut Vec<String>) {
+    for (i, instance) in objects.shapes.instances.iter().enumerate() {
+        if objects.material(instance).emits() && !lights.emits(i as u32) {
             warnings
                 .push(format!("object \"{}\": its emissive surface has no area, so it gives no light", instance.name));
         }
@@ -258,12 +253,13 @@ pub(super) fn rebuild_with_materials(
     environment: Option<Environment>,
 ) -> Result<Scene> {
     let (shapes, materials) = (Arc::clone(&scene.shapes), Arc::new(materials));
+    let objects = Objects { shapes: &shapes, materials: &materials };
     // Embree's filters keep the materials that they were built with.
     let traced = |materials: &Materials| materials.list.iter().map(hit_behaviour).collect::<Vec<_>>();
     let passing = |materials: &Materials| materials.list.iter().map(Material::transmits).collect::<Vec<bool>>();
     let contacts = match passing(&materials) == passing(&scene.materials) {
         true => Arc::clone(&scene.contacts),
-        false => Arc::new(Contacts::new(&shapes, &materials)),
+        false => Arc::new(Contacts::new(objects)),
     };
     let (tracer, pass_through_lights) = match traced(&materials) == traced(&scene.materials) {
         true => (scene.tracer.clone(), scene.pass_through_lights.clone()),
@@ -272,7 +268,7 @@ pub(super) fn rebuild_with_materials(
     let catchers = catchers(&shapes, &materials, rayon::current_num_threads())?;
     let others = scene.lights.others().cloned();
     let sky = Sky { environment, ..scene.lights.sky().clone() };
-    let lights = Lights::new(&shapes, &materials, others.collect(), sky).with_groups(scene.lights.groups().clone());
+    let lights = Lights::new(objects, others.collect(), sky).with_groups(scene.lights.groups().clone());
     Ok(Scene {
         source: scene.source.clone(),
         files: scene.files.clone(),
@@ -293,10 +289,10 @@ pub(super) fn rebuild_with_materials(
         shutter: scene.shutter,
         medium,
         scattering: scene.scattering.for_materials(&materials.list),
-        survey: Survey::new(&shapes, &materials, &lights, medium),
+        survey: Survey::new(objects, &lights, medium),
         contacts,
         ranks: Arc::clone(&scene.ranks),
-        alpha_solids: alpha_solids(&shapes, &materials).into(),
+        alpha_solids: alpha_solids(objects).into(),
         solid_stacks: SolidStacks::default(),
         warnings: Vec::new(),
         shapes,

@@ -2,7 +2,7 @@
 //! (`scene/contact.rs`).
 
 use crate::geometry::{Extent, Shapes, coordinate_error};
-use crate::material::Materials;
+use crate::material::Objects;
 use crate::math::Vec3;
 use rayon::prelude::*;
 use rstar::{AABB, RTree, RTreeObject};
@@ -124,7 +124,7 @@ struct Contact {
 
 impl Contacts {
     /// Finds the contacts of a scene.
-    pub fn new(shapes: &Shapes, materials: &Materials) -> Contacts {
+    pub fn new(Objects { shapes, materials }: Objects<'_>) -> Contacts {
         let transmits =
             |instance: u32| materials.list[shapes.instances[instance as usize].material as usize].transmits();
         let instances = 0..shapes.instances.len() as u32;
@@ -197,7 +197,7 @@ impl Contacts {
 
     /// The contacts at another moment of a moving scene. Touching surfaces are queried at every hit of an instance that
     /// moves or may touch one that does, if either transmits light. `boxes`: bounding box of each instance.
-    pub fn at_moment(&self, shapes: &Shapes, materials: &Materials, boxes: &[(Vec3, Vec3)]) -> Contacts {
+    pub fn at_moment(&self, Objects { shapes, materials }: Objects<'_>, boxes: &[(Vec3, Vec3)]) -> Contacts {
         let material = |i: usize| &materials.list[shapes.instances[i].material as usize];
         let transmits: Vec<bool> = (0..boxes.len()).map(|i| material(i).transmits()).collect();
         let moving: Vec<usize> = (0..boxes.len()).filter(|&i| shapes.instances[i].moves).collect();

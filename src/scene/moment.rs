@@ -8,7 +8,7 @@ use super::{Contacts, Scene, SolidStacks, Survey, build};
 use crate::error::Result;
 use crate::geometry::{Instance, Mesh, Shapes};
 use crate::light::{Emitter, Sky};
-use crate::material::{Material, Materials, MediumParameters, Scattering};
+use crate::material::{Material, Materials, MediumParameters, Objects, Scattering};
 use crate::math::{Vec3, bounding_box, corners};
 use crate::trace::Tracer;
 use std::sync::Arc;
@@ -42,7 +42,7 @@ impl<'a> MomentBuilder<'a> {
             scene,
             mesh_boxes,
             boxes,
-            volumes: Volumes::of(&scene.shapes, &scene.materials),
+            volumes: Volumes::of(Objects { shapes: &scene.shapes, materials: &scene.materials }),
             meshes: sphere.map_or(meshes.len(), |sphere| sphere.mesh as usize),
             materials: sphere.map_or(scene.materials.list.len(), |sphere| sphere.material as usize),
         }
@@ -69,6 +69,7 @@ impl<'a> MomentBuilder<'a> {
         let instances = self.instances(&description);
         let shapes = Arc::new(scene.shapes.at_moment(std::mem::take(&mut description.meshes), instances));
         let (materials, medium) = self.materials(&mut description, &shapes, materials_move);
+        let objects = Objects { shapes: &shapes, materials: &materials };
         let boxes = self.boxes(&shapes);
         let (sky, same_sky) = self.sky(&boxes);
         let lights = description.lights.iter().filter(|light| !light.is_sphere());
@@ -78,8 +79,8 @@ impl<'a> MomentBuilder<'a> {
         let same_lights = same_sky
             && Arc::ptr_eq(&materials, &scene.materials)
             && others.iter().eq(scene.lights.others())
-            && !self.moves_emitters(&shapes, &materials);
-        let lights = scene.lights.at_moment((&shapes, &materials), others, sky, !same_lights);
+            && !self.moves_emitters(objects);
+        let lights = scene.lights.at_moment(objects, others, sky, !same_lights);
         let (tracer, pass_through_lights) = self.tracers(&shapes, &materials)?;
         let catchers = build::catchers(&shapes, &materials, rayon::current_num_threads())?;
         Ok(Scene {
@@ -102,12 +103,12 @@ impl<'a> MomentBuilder<'a> {
             shutter: scene.shutter,
             medium,
             scattering: self.scattering(&materials),
-            survey: Survey::new(&shapes, &materials, &lights, medium),
-            contacts: self.contacts(&shapes, &materials, &boxes),
-            ranks: self.ranks(&shapes, &materials),
+            survey: Survey::new(objects, &lights, medium),
+            contacts: self.contacts(objects, &boxes),
+            ranks: self.volumes.at_moment(&scene.shapes, objects).ranks(&shapes),
             alpha_solids: match Arc::ptr_eq(&materials, &scene.materials) {
                 true => Arc::clone(&scene.alpha_solids),
-                false => alpha_solids(&shapes, &materials).into(),
+                false => alpha_solids(objects).into(),
             },
             solid_stacks: SolidStacks::default(),
             warnings: Vec::new(),
@@ -216,18 +217,18 @@ impl<'a> MomentBuilder<'a> {
     }
 
     /// Whether an emissive instance differs from that at the frame.
-    fn moves_emitters(&self, shapes: &Shapes, materials: &Materials) -> bool {
+    fn moves_emitters(&self, objects: Objects<'_>) -> bool {
         let own = &self.scene.shapes;
         let points = |instance: &Instance| instance.to_world.map(|placement| placement.points);
         let differs = |now: &Instance, before: &Instance| {
-            let mesh = &shapes.meshes[now.mesh as usize];
+            let mesh = &objects.shapes.meshes[now.mesh as usize];
             points(now) != points(before) || !Arc::ptr_eq(mesh, &own.meshes[before.mesh as usize])
         };
         let emits = |instance: &Instance| {
-            let material = &materials.list[instance.material as usize];
+            let material = objects.material(instance);
             material.emits() || material.medium_emission().is_some()
         };
-        let moving = shapes.instances.iter().zip(&own.instances).filter(|(now, _)| now.moves && emits(now));
+        let moving = objects.shapes.instances.iter().zip(&own.instances).filter(|(now, _)| now.moves && emits(now));
         moving.into_iter().any(|(now, before)| differs(now, before))
     }
 
@@ -248,16 +249,11 @@ impl<'a> MomentBuilder<'a> {
         Ok((at(&scene.tracer, false)?, pass_through))
     }
 
-    /// The ranks of solids that overlap, which change if one of them is scaled or deformed.
-    fn ranks(&self, shapes: &Shapes, materials: &Materials) -> Arc<[u32]> {
-        self.volumes.at_moment(&self.scene.shapes, shapes, materials).ranks(shapes)
-    }
-
-    fn contacts(&self, shapes: &Shapes, materials: &Materials, boxes: &[Box3]) -> Arc<Contacts> {
+    fn contacts(&self, objects: Objects<'_>, boxes: &[Box3]) -> Arc<Contacts> {
         let passing = |materials: &Materials| materials.list.iter().map(Material::transmits).collect::<Vec<_>>();
-        Arc::new(match passing(materials) == passing(&self.scene.materials) {
-            true => self.scene.contacts.at_moment(shapes, materials, boxes),
-            false => Contacts::new(shapes, materials),
+        Arc::new(match passing(objects.materials) == passing(&self.scene.materials) {
+            true => self.scene.contacts.at_moment(objects, boxes),
+            false => Contacts::new(objects),
         })
     }
 }

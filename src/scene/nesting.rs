@@ -5,7 +5,7 @@
 //! threads, the stack does not. Few scenes have such deep stacks, so the lock does not matter.
 
 use crate::geometry::{Instance, Mesh, Shapes};
-use crate::material::Materials;
+use crate::material::Objects;
 use crate::math::warp;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, PoisonError, RwLock};
@@ -47,14 +47,15 @@ pub struct Volumes {
 
 impl Volumes {
     /// Measures the solids of a scene.
-    pub fn of(shapes: &Shapes, materials: &Materials) -> Volumes {
-        Volumes::default().measured((shapes, materials), |_| false)
+    pub fn of(objects: Objects<'_>) -> Volumes {
+        Volumes::default().measured(objects, |_| false)
     }
 
     /// Measures the solids at a moment. `self` are their volumes at the frame, whose shapes are `own`.
-    pub fn at_moment(&self, own: &Shapes, shapes: &Shapes, materials: &Materials) -> Volumes {
-        let is_same = |mesh: usize| own.meshes.get(mesh).is_some_and(|own| Arc::ptr_eq(own, &shapes.meshes[mesh]));
-        let mut now = self.measured((shapes, materials), is_same);
+    pub fn at_moment(&self, own: &Shapes, objects: Objects<'_>) -> Volumes {
+        let meshes = &objects.shapes.meshes;
+        let is_same = |mesh: usize| own.meshes.get(mesh).is_some_and(|own| Arc::ptr_eq(own, &meshes[mesh]));
+        let mut now = self.measured(objects, is_same);
         for (object, volume) in &mut now.of_object {
             let before = self.of_object.get(object).copied().unwrap_or(0.0);
             if (*volume - before).abs() <= MAX_ROUNDING * before.abs() {
@@ -65,15 +66,14 @@ impl Volumes {
     }
 
     /// Measures the solids. Meshes for which `is_known` is true have the volumes that they have in `self`.
-    fn measured(&self, (shapes, materials): (&Shapes, &Materials), is_known: impl Fn(usize) -> bool) -> Volumes {
+    fn measured(&self, objects: Objects<'_>, is_known: impl Fn(usize) -> bool) -> Volumes {
         let mut volumes = Volumes::default();
-        for instance in shapes.instances.iter().filter(|i| materials.list[i.material as usize].is_solid()) {
-            let mesh = instance.mesh as usize;
-            let known = self.of_mesh.get(&instance.mesh).copied().filter(|_| is_known(mesh));
+        for instance in objects.shapes.instances.iter().filter(|instance| objects.material(instance).is_solid()) {
+            let known = self.of_mesh.get(&instance.mesh).copied().filter(|_| is_known(instance.mesh as usize));
             let own = *volumes
                 .of_mesh
                 .entry(instance.mesh)
-                .or_insert_with(|| known.unwrap_or_else(|| volume(&shapes.meshes[mesh])));
+                .or_insert_with(|| known.unwrap_or_else(|| volume(objects.mesh(instance))));
             let scale = instance.to_world.as_ref().map_or(1.0, |placement| placement.points.matrix3.determinant());
             *volumes.of_object.entry(instance.object).or_default() += own * f64::from(scale.abs());
         }
@@ -125,18 +125,19 @@ const MIN_CHANCE: f64 = 1e-3;
 
 /// The solids of all instances, with the probability that alpha lets them exist: the mean over the object if it varies.
 /// Empty if all solids exist for all paths.
-pub fn alpha_solids(shapes: &Shapes, materials: &Materials) -> Vec<AlphaSolid> {
-    let mut objects = BTreeMap::<u32, (f64, f64)>::new();
+pub fn alpha_solids(objects: Objects<'_>) -> Vec<AlphaSolid> {
+    let Objects { shapes, materials } = objects;
+    let mut sums = BTreeMap::<u32, (f64, f64)>::new();
     for (index, instance) in shapes.instances.iter().enumerate() {
-        let material = &materials.list[instance.material as usize];
+        let material = objects.material(instance);
         if !material.has_alpha_per_entry() {
             continue;
         }
-        let mesh = &shapes.meshes[instance.mesh as usize];
+        let mesh = objects.mesh(instance);
         let varies = material.base_color_texture.is_some() || !mesh.colors.is_empty();
         let triangles = if varies { mesh.triangles.len() } else { mesh.triangles.len().min(1) };
         let points = if varies { (ALPHA_POINTS / triangles.max(1)).max(1) } else { 1 };
-        let (sum, area) = objects.entry(instance.object).or_default();
+        let (sum, area) = sums.entry(instance.object).or_default();
         for primitive in 0..triangles as u32 {
             let [a, b, c] = instance.corners(mesh, primitive);
             let weight = f64::from((b - a).cross(c - a).length()) / points as f64;
@@ -153,7 +154,7 @@ pub fn alpha_solids(shapes: &Shapes, materials: &Materials) -> Vec<AlphaSolid> {
     // Paths meet both cases if alpha varies, also where rounding or too few points miss one.
     let inside = |mean: f64| if mean > 0.0 && mean < 1.0 { mean.clamp(MIN_CHANCE, 1.0 - MIN_CHANCE) } else { mean };
     let chance = |(sum, area): (f64, f64)| if area > 0.0 { inside(sum / area) as f32 } else { 1.0 };
-    let partial = objects.into_iter().map(|(object, of)| (object, chance(of))).filter(|(_, chance)| *chance < 1.0);
+    let partial = sums.into_iter().map(|(object, of)| (object, chance(of))).filter(|(_, chance)| *chance < 1.0);
     let codes = CODES.into_iter().cycle();
     let solids: HashMap<u32, AlphaSolid> =
         partial.zip(codes).map(|((object, chance), code)| (object, AlphaSolid { chance, code })).collect();
@@ -162,7 +163,7 @@ pub fn alpha_solids(shapes: &Shapes, materials: &Materials) -> Vec<AlphaSolid> {
     }
     let certain = AlphaSolid { chance: 1.0, code: 0 };
     let of = |instance: &Instance| {
-        let alpha = materials.list[instance.material as usize].has_alpha_per_entry();
+        let alpha = objects.material(instance).has_alpha_per_entry();
         solids.get(&instance.object).copied().filter(|_| alpha).unwrap_or(certain)
     };
     shapes.instances.iter().map(of).collect()

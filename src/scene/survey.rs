@@ -1,8 +1,7 @@
 //! Kinds of things that a scene contains.
 
-use crate::geometry::Shapes;
 use crate::light::{Light, Lights};
-use crate::material::{Alpha, Materials, MediumParameters};
+use crate::material::{Alpha, MediumParameters, Objects};
 
 /// Which kinds of things a scene contains; each field is true if there is at least one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -55,7 +54,7 @@ impl Survey {
     }
 
     /// Finds out which kinds of things a scene contains.
-    pub fn new(shapes: &Shapes, materials: &Materials, lights: &Lights, medium: Option<MediumParameters>) -> Survey {
+    pub fn new(objects: Objects<'_>, lights: &Lights, medium: Option<MediumParameters>) -> Survey {
         let scatters = |medium: &Option<MediumParameters>| medium.is_some_and(|medium| medium.scatters());
         let mut survey = Survey {
             media: medium.is_some(),
@@ -63,16 +62,15 @@ impl Survey {
             environment: lights.sky().environment.is_some() && !lights.sky().hidden_from_camera,
             ..Survey::default()
         };
-        let mut uses = vec![0usize; materials.list.len()];
-        for instance in &shapes.instances {
+        let mut uses = vec![0usize; objects.materials.list.len()];
+        for instance in &objects.shapes.instances {
             uses[instance.material as usize] += 1;
             survey.hidden_from_camera |= instance.hidden_from_camera;
-            survey.hidden_solids |=
-                instance.hidden_from_camera && materials.list[instance.material as usize].is_solid();
+            survey.hidden_solids |= instance.hidden_from_camera && objects.material(instance).is_solid();
             survey.catchers |= instance.shadow_catcher;
         }
         let (mut solids, mut perfect, mut sharp) = (0, false, false);
-        for (material, &uses) in materials.list.iter().zip(&uses) {
+        for (material, &uses) in objects.materials.list.iter().zip(&uses) {
             if uses == 0 {
                 continue;
             }

@@ -4,7 +4,7 @@ use super::{Light, LightRay, Owner, SceneParts, Selected};
 use crate::geometry::{Shapes, Surface, offset_origin, shadow_end, triangle_error};
 use crate::light::bounds::Bounds;
 use crate::light::{Cone, DirectSample, EmissionSample, Sky, Spread};
-use crate::material::{Alpha, Materials};
+use crate::material::{Alpha, Objects};
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, luminance, warp};
 use std::f32::consts::PI;
 
@@ -39,10 +39,10 @@ pub struct TriangleLight {
 
 impl TriangleLight {
     /// The light of a triangle of an emissive material; `None` if the triangle has no area or does not emit.
-    pub fn new(shapes: &Shapes, materials: &Materials, instance: u32, primitive: u32) -> Option<TriangleLight> {
+    pub fn new(objects: Objects<'_>, instance: u32, primitive: u32) -> Option<TriangleLight> {
+        let Objects { shapes, materials } = objects;
         let placed = &shapes.instances[instance as usize];
-        let material = &materials.list[placed.material as usize];
-        let mesh = &shapes.meshes[placed.mesh as usize];
+        let (material, mesh) = (objects.material(placed), objects.mesh(placed));
         let [a, b, c] = placed.corners(mesh, primitive);
         let area = 0.5 * (b - a).cross(c - a).length();
         // The mean over a few points suffices to select a light; a sample's radiance is looked up exactly.
