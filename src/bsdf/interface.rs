@@ -152,7 +152,7 @@ impl<'a> Interface<'a> {
             Some(sides) if bends && rough => {
                 let mean = average.element_sum() / 3.0;
                 let f0 = if filmed { sides[0].f0_of_average(mean, f90) } else { f0_max };
-                Some(RoughGlass::new(&ggx, alpha, sides, (p.eta, f0, f90), &keep))
+                Some(RoughGlass::new(&ggx, alpha, sides, p.eta, f0, f90, &keep))
             }
             _ => None,
         };
@@ -254,7 +254,9 @@ impl<'a> RoughGlass<'a> {
         ggx: &Ggx,
         alpha: Position,
         sides: [&SideTables; 2],
-        (eta, f0, f90): (f32, f32, f32),
+        eta: f32,
+        f0: f32,
+        f90: f32,
         keep: &impl Fn(&[AnisotropicProfile]) -> Profiles<'a>,
     ) -> RoughGlass<'a> {
         let alphas = [ggx.alpha_x, ggx.alpha_y].map(Position::new);

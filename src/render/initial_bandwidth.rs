@@ -10,9 +10,9 @@
 
 use crate::camera::{Camera, par_pixels, pixels_per_band};
 use crate::photon::{Located, Nearest, PhotonMap, VolumePhoton};
-use crate::random::{Domain, Stream, Streams};
+use crate::random::{Domain, Streams};
 use crate::stat::median;
-use crate::transport::{CameraPaths, GatherPoint, PathStart};
+use crate::transport::{CameraPathStart, CameraPaths, GatherPoint};
 use bumpalo::Bump;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -147,7 +147,7 @@ fn bandwidths<P: Located, const MAPS: usize>(
     bounds: Bounds<MAPS>,
     seed: u64,
     pilots: [&PhotonMap<P>; MAPS],
-    find: impl Fn(&Bump, &(PathStart, Stream)) -> Option<GatherPoint> + Sync,
+    find: impl Fn(&Bump, &CameraPathStart) -> Option<GatherPoint> + Sync,
 ) -> Vec<[f32; MAPS]> {
     let (scene, camera) = (camera_paths.scene, camera_paths.camera);
     let (width, height) = camera.size();

@@ -24,9 +24,9 @@ use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
 use caustique::transport::bidirectional::mis::{self, Eta, Merges, MisState, Ratios, one_merge};
 use caustique::transport::{
-    Bidirectional, CameraPaths, CameraWalkContext, Deposits, Indirect, InitialMedia, LightPaths, LightVertices,
-    MediumVertex, MergeLevels, Next, PathRecorder, PathStart, PixelSample, SPARED_BY_ROULETTE, Scattered, Technique,
-    TechniqueSet, Vertex, Visitor, lit_side, walk,
+    Bidirectional, CameraPathStart, CameraPaths, CameraWalkContext, Deposits, Indirect, InitialMedia, LightPaths,
+    LightVertices, MediumVertex, MergeLevels, Next, PathRecorder, PathStart, PixelSample, SPARED_BY_ROULETTE,
+    Scattered, Technique, TechniqueSet, Vertex, Visitor, lit_side, walk,
 };
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 
@@ -593,7 +593,7 @@ impl<'a> Lab<'a> {
         let mut measure = PixelSample::default();
         shared.camera_path(
             &arena,
-            &(shared.camera_paths.start(pixel, stream), stream),
+            &CameraPathStart { ray: shared.camera_paths.start(pixel, stream), stream },
             &meets,
             &mut by_camera,
             &mut measure,

@@ -12,7 +12,7 @@ use caustique::random::{Domain, Stream};
 use caustique::render::{InitialBandwidth, Levels, Method, Settings};
 use caustique::scene::Scene;
 use caustique::spectrum::{SPREAD, Wavelength, WavelengthSample};
-use caustique::transport::{CameraPaths, MAX_SPLITS, PixelSample, path_sample};
+use caustique::transport::{CameraPathStart, CameraPaths, MAX_SPLITS, PixelSample, path_sample};
 use support::channels::{SIZE, TILE, TILES, agree, seeds};
 use support::render;
 use support::scenes::{add, build, camera_paths, cuboid, glass, lit_room, matte, sphere, square};
@@ -37,7 +37,8 @@ fn samples(scene: &Scene, splits: u32, paths: u64, seed: u64, mut add: impl FnMu
         for path in 0..paths {
             arena.reset();
             let stream = Stream::new(seed, path, Domain::Test, u64::from(index));
-            let start = (camera_paths.start((index % SIZE, index / SIZE), stream), stream);
+            let ray = camera_paths.start((index % SIZE, index / SIZE), stream);
+            let start = CameraPathStart { ray, stream };
             path_sample(&camera_paths, &arena, &start, &mut (), &mut sample);
             add(index, &sample);
         }

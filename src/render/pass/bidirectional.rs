@@ -385,7 +385,7 @@ impl Iteration<'_, '_> {
                     camera_arena.reset();
                     let connected = &vertices[traced.connected(cells, pixels[k])];
                     // All paths of a cell take one wavelength, so that they can be connected.
-                    start.0.wavelength_sample = tracer.wavelength(pixels[k]);
+                    start.ray.wavelength_sample = tracer.wavelength(pixels[k]);
                     let sample = self.camera_path(walks, camera_arena, place, start, connected, *recorder);
                     samples.set(place.at, &sample);
                 }
@@ -405,7 +405,7 @@ impl Iteration<'_, '_> {
         recorder: &mut W,
     ) -> PixelSample {
         let levels = self.levels(place.index as u32, walks.pair);
-        let photons = self.photons_of_path(|| start.1.vertex(0).one(Purpose::Merging));
+        let photons = self.photons_of_path(|| start.stream.vertex(0).one(Purpose::Merging));
         let context = CameraWalkContext { vertices, photons, levels: &levels };
         recorder.select_pixel(place.at, walks.own);
         let mut sample = PixelSample::default();

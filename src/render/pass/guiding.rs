@@ -18,7 +18,7 @@ use crate::random::{Domain, Purpose, Stream};
 use crate::render::initial_bandwidth::{SCREEN_CAP, picture_width_at};
 use crate::render::input::RenderInput;
 use crate::render::settings::{Candidate, Settings};
-use crate::transport::{CameraPaths, Indirect, InitialMedia, LightPaths, Photons, Probe, light_path};
+use crate::transport::{CameraPathStart, CameraPaths, Indirect, InitialMedia, LightPaths, Photons, Probe, light_path};
 use bumpalo::Bump;
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -225,7 +225,8 @@ fn estimate_error(
             let pixel = ((f64::from(index) + f64::from(offset)) * pixels as f64 / f64::from(paths)) as u64;
             let pixel = pixel.min(pixels - 1);
             let at = ((pixel % u64::from(width)) as u32, (pixel / u64::from(width)) as u32);
-            if let Some(probe) = camera_paths.probe(&arena, &(camera_paths.start(at, stream), stream)) {
+            let start = CameraPathStart { ray: camera_paths.start(at, stream), stream };
+            if let Some(probe) = camera_paths.probe(&arena, &start) {
                 add_errors(camera_paths, maps, &mut nearest, &probe, &mut error);
             }
         }

@@ -27,8 +27,8 @@ use crate::render::input::RenderInput;
 use crate::render::settings::Settings;
 use crate::transport::bidirectional::mis::Eta;
 use crate::transport::{
-    Bidirectional, CameraWalkContext, Deposits, Division, FirstScatter, LightPaths, LightVertices, LobeLight,
-    MergeLevels, PathKind, PathRecorder, PixelSample, Splat, Technique, TechniqueSet,
+    Bidirectional, CameraPathStart, CameraWalkContext, Deposits, Division, FirstScatter, LightPaths, LightVertices,
+    LobeLight, MergeLevels, PathKind, PathRecorder, PixelSample, Splat, Technique, TechniqueSet,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -204,10 +204,10 @@ impl Walks<'_, '_> {
             shared.light_path(&self.light_paths, &emitted, false, &mut vertices, left, &mut ());
         }
         if shared.only.is_none_or(|only| only.camera > 0) {
-            let mut start = shared.camera_paths.start_at((pixel.x, pixel.y), within, camera);
-            start.wavelength_sample = self.light_paths.wavelength_sample_of(light);
+            let mut ray = shared.camera_paths.start_at((pixel.x, pixel.y), within, camera);
+            ray.wavelength_sample = self.light_paths.wavelength_sample_of(light);
             let context = CameraWalkContext { vertices: &vertices, photons: None, levels: self.levels };
-            shared.camera_path(arena, &(start, camera), &context, found, sample);
+            shared.camera_path(arena, &CameraPathStart { ray, stream: camera }, &context, found, sample);
         }
     }
 

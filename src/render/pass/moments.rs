@@ -488,7 +488,7 @@ impl Walks<'_, '_> {
         output: &mut RowOutput,
     ) {
         let pixel = index as usize;
-        start.0.wavelength_sample = light_paths.wavelength(index);
+        start.ray.wavelength_sample = light_paths.wavelength(index);
         let emitted = light_paths.emit(self.proxy.scene, self.variants[0].initial_media, index);
         let levels = self.levels(pixel);
         let mut left: [Deposits; 3] = Default::default();

@@ -4,10 +4,9 @@ use super::photon_counts::PhotonCounts;
 use crate::camera::GROUP_SIZE;
 use crate::estimator::{PixelAccumulator, Schedule};
 use crate::photon::{PhotonMap, PhotonMaps, VolumePhoton};
-use crate::random::Stream;
 use crate::render::settings::Settings;
 use crate::spectrum::IterationWavelengths;
-use crate::transport::{PathStart, Volume};
+use crate::transport::{CameraPathStart, Volume};
 
 /// Photon maps of an iteration: photons on surfaces and in media.
 pub(super) struct Maps {
@@ -42,12 +41,9 @@ impl Maps {
 
     /// Sets the wavelengths of camera paths to those of the light paths.
     #[inline]
-    pub fn tune(
-        &self,
-        mut starts: [Option<(PathStart, Stream)>; GROUP_SIZE],
-    ) -> [Option<(PathStart, Stream)>; GROUP_SIZE] {
-        for (start, _) in starts.iter_mut().flatten() {
-            start.wavelength_sample = self.wavelengths.nearest(start.wavelength_sample);
+    pub fn tune(&self, mut starts: [Option<CameraPathStart>; GROUP_SIZE]) -> [Option<CameraPathStart>; GROUP_SIZE] {
+        for CameraPathStart { ray, .. } in starts.iter_mut().flatten() {
+            ray.wavelength_sample = self.wavelengths.nearest(ray.wavelength_sample);
         }
         starts
     }

@@ -13,9 +13,9 @@ use crate::math::{Rgb, Vec3, is_lit};
 use crate::medium::FlightDensity;
 use crate::path_class::{LightPrefix, Part, PathClass};
 use crate::photon::PhotonMap;
-use crate::random::{Purpose, Stream, mix};
+use crate::random::{Purpose, mix};
 use crate::stop::Stop;
-use crate::transport::walk::camera_paths::CameraPaths;
+use crate::transport::walk::camera_paths::{CameraPathStart, CameraPaths};
 use crate::transport::walk::cause::Cause;
 use crate::transport::walk::interior::{Interior, Presence};
 use crate::transport::walk::lobe_layers::{FirstScatter, LobeHistory};
@@ -24,7 +24,7 @@ use crate::transport::walk::pixel_sample::{Features, PixelSample};
 use crate::transport::walk::scattering_vertex::{ScatterPoint, ShadowTarget};
 use crate::transport::walk::segment::{Destination, FirstHit, with_camera_bit};
 use crate::transport::walk::vertex::{MediumLight, MediumVertex, Next, Scattered, Vertex, Visitor};
-use crate::transport::walk::{PathStart, walk};
+use crate::transport::walk::walk;
 use bumpalo::Bump;
 
 /// Light path and photons that the vertices of a camera path are connected to and merged with.
@@ -518,26 +518,27 @@ impl Bidirectional<'_> {
     pub fn camera_path<R: PathRecorder>(
         &self,
         arena: &Bump,
-        (start, stream): &(PathStart, Stream),
+        start: &CameraPathStart,
         context: &CameraWalkContext<'_>,
         record: &mut R,
         sample: &mut PixelSample,
     ) {
         *sample = PixelSample::default();
         let camera_paths = &self.camera_paths;
-        let pdf_w = camera_paths.camera.pdf_w(start.direction) * self.pixels();
+        let CameraPathStart { ray, stream } = start;
+        let pdf_w = camera_paths.camera.pdf_w(ray.direction) * self.pixels();
         let mut visitor = CameraWalk {
             shared: self,
             context,
             mis: MisState::camera(self.light_paths, pdf_w),
             history: PathHistory::START,
-            last: Receiver::anywhere(start.origin),
+            last: Receiver::anywhere(ray.origin),
             depth: 0,
             chance: 1.0,
             lobes: camera_paths.lobes.then(LobeHistory::default),
             sample,
             record,
         };
-        walk(camera_paths.scene, arena, start, *stream, Transport::Radiance, camera_paths.max_depth, &mut visitor);
+        walk(camera_paths.scene, arena, ray, *stream, Transport::Radiance, camera_paths.max_depth, &mut visitor);
     }
 }

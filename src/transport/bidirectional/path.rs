@@ -16,7 +16,7 @@ use crate::random::Stream;
 use crate::scene::Scene;
 use crate::stop::Stop;
 use crate::trace::Tracer;
-use crate::transport::walk::camera_paths::CameraPaths;
+use crate::transport::walk::camera_paths::{CameraPathStart, CameraPaths};
 use crate::transport::walk::cause::Cause;
 use crate::transport::walk::direct::caught_light;
 use crate::transport::walk::lobe_layers::{FirstScatter, LobeHistory};
@@ -25,7 +25,7 @@ use crate::transport::walk::pixel_sample::PixelSample;
 use crate::transport::walk::roulette::SPARED_BY_ROULETTE;
 use crate::transport::walk::scattering_vertex::ScatterPoint;
 use crate::transport::walk::vertex::{MediumLight, MediumVertex, Next, Scattered, Vertex, Visitor};
-use crate::transport::walk::{PathStart, walk};
+use crate::transport::walk::walk;
 use bumpalo::Bump;
 
 struct PathTracer<'a, R> {
@@ -290,7 +290,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
 pub fn path_sample(
     camera_paths: &CameraPaths<'_>,
     arena: &Bump,
-    (start, stream): &(PathStart, Stream),
+    start: &CameraPathStart,
     record: &mut impl PathRecorder,
     sample: &mut PixelSample,
 ) {
@@ -298,16 +298,17 @@ pub fn path_sample(
     let history = PathHistory::START;
     let CameraPaths { scene, max_depth, splits, classes, stop, .. } = *camera_paths;
     let lobes = camera_paths.lobes.then(LobeHistory::default);
-    let last = Receiver::anywhere(start.origin);
+    let last = Receiver::anywhere(start.ray.origin);
     let (depth, on_catcher) = (0, false);
     let mut tracer =
         PathTracer { scene, max_depth, splits, classes, lobes, sample, history, last, depth, on_catcher, record, stop };
-    walk(camera_paths.scene, arena, start, *stream, Transport::Radiance, camera_paths.max_depth, &mut tracer);
+    walk(camera_paths.scene, arena, &start.ray, start.stream, Transport::Radiance, camera_paths.max_depth, &mut tracer);
 }
 
 /// Radiance of one path through a uniform point of pixel `(x, y)`.
 pub fn path_radiance(camera_paths: &CameraPaths<'_>, pixel: (u32, u32), stream: Stream) -> Rgb {
     let mut sample = PixelSample::default();
-    path_sample(camera_paths, &Bump::new(), &(camera_paths.start(pixel, stream), stream), &mut (), &mut sample);
+    let start = CameraPathStart { ray: camera_paths.start(pixel, stream), stream };
+    path_sample(camera_paths, &Bump::new(), &start, &mut (), &mut sample);
     sample.radiance(0)
 }

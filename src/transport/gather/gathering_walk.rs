@@ -480,7 +480,7 @@ impl CameraPaths<'_> {
     pub fn sample<B: GatherBandwidths>(
         &self,
         scratch: &mut Scratch,
-        (start, stream): &CameraPathStart,
+        start: &CameraPathStart,
         photons: &PhotonMaps,
         volume: Option<Volume<'_>>,
         bandwidths: &mut B,
@@ -512,7 +512,7 @@ impl CameraPaths<'_> {
             last: Receiver::anywhere(Vec3::ZERO),
             stop: self.stop,
         };
-        walk(self.scene, &scratch.arena, start, *stream, Transport::Radiance, self.max_depth, &mut visitor);
+        walk(self.scene, &scratch.arena, &start.ray, start.stream, Transport::Radiance, self.max_depth, &mut visitor);
         let sample = visitor.sample;
         scratch.arena.reset();
         sample

@@ -7,10 +7,10 @@ use crate::math::Vec3;
 use crate::photon::{Located, PhotonMap, same_surface};
 use crate::random::{Domain, Stream};
 use crate::scene::Scene;
-use crate::transport::walk::camera_paths::{CameraPathStart, CameraPaths};
+use crate::transport::walk::camera_paths::CameraPaths;
 use crate::transport::walk::initial_media::InitialMedia;
 use crate::transport::walk::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
-use crate::transport::walk::walk;
+use crate::transport::walk::{PathStart, walk};
 use bumpalo::Bump;
 use rayon::prelude::*;
 
@@ -264,7 +264,7 @@ fn mean(counts: impl ExactSizeIterator<Item = [f64; 6]>) -> [f64; 6] {
 /// Counts the vertices of one path; none without a start.
 fn count_path<'a, const THROUGH: bool>(
     camera_paths: &CameraPaths<'a>,
-    start: Option<CameraPathStart>,
+    start: Option<(PathStart, Stream)>,
     transport: Transport,
 ) -> Count<'a, THROUGH> {
     let (scene, max_depth) = (camera_paths.scene, camera_paths.max_depth);

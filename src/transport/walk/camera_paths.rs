@@ -39,8 +39,13 @@ impl Indirect {
     }
 }
 
-/// The first ray of a camera path, and the random numbers of the path.
-pub type CameraPathStart = (PathStart, Stream);
+/// The start of a camera path.
+pub struct CameraPathStart {
+    /// The first ray.
+    pub ray: PathStart,
+    /// The random numbers of the path.
+    pub stream: Stream,
+}
 
 /// Settings and shared data of all camera paths of a render.
 #[derive(Clone, Copy)]
@@ -139,14 +144,15 @@ impl CameraPaths<'_> {
                 let stream = streams.path(key);
                 let first = PrecomputedHit::Nothing;
                 let film = film.path(key);
-                *start = Some((PathStart { first, ..self.start(place.pixel, film) }, stream));
+                let ray = PathStart { first, ..self.start(place.pixel, film) };
+                *start = Some(CameraPathStart { ray, stream });
             }
         }
         let mut hits = [const { None }; GROUP_SIZE];
         let ray = |k: usize| {
-            starts[k].as_ref().map(|(start, stream): &CameraPathStart| Ray {
-                origin: start.origin,
-                direction: start.direction,
+            starts[k].as_ref().map(|CameraPathStart { ray, stream }| Ray {
+                origin: ray.origin,
+                direction: ray.direction,
                 tmax: f32::INFINITY,
                 token: camera_token(self.scene, stream.vertex(0), Purpose::Alpha),
             })
@@ -155,8 +161,8 @@ impl CameraPaths<'_> {
         let triangles = hits.iter().flatten().map(|hit| (hit.instance, hit.primitive));
         self.scene.shapes.prefetch(triangles);
         for (start, hit) in starts.iter_mut().zip(hits) {
-            if let (Some((start, _)), Some(hit)) = (start, hit) {
-                start.first = PrecomputedHit::Hit(hit);
+            if let (Some(start), Some(hit)) = (start, hit) {
+                start.ray.first = PrecomputedHit::Hit(hit);
             }
         }
         starts

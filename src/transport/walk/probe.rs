@@ -1,13 +1,12 @@
 //! The first vertex where a camera path gathers photons, and the contribution of a photon there.
 
-use super::camera_paths::CameraPaths;
+use super::camera_paths::{CameraPathStart, CameraPaths};
 use super::direct::direct_light;
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
-use super::{PathStart, walk};
+use super::walk;
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3};
 use crate::photon::NO_NORMAL;
-use crate::random::Stream;
 use bumpalo::Bump;
 use std::f32::consts::FRAC_1_PI;
 
@@ -58,12 +57,12 @@ impl<'a, T, F: FnMut(&Vertex<'_, '_>) -> T> Visitor<'a> for Find<F, T> {
 
 impl CameraPaths<'_> {
     /// The first surface point where a camera path gathers photons; `None` if there is none.
-    pub fn gather_point(&self, arena: &Bump, start: &(PathStart, Stream)) -> Option<GatherPoint> {
+    pub fn gather_point(&self, arena: &Bump, start: &CameraPathStart) -> Option<GatherPoint> {
         self.find(arena, start, |_| ()).map(|(point, ())| point)
     }
 
     /// The first surface vertex where a camera path gathers photons, with its light; `None` if there is none.
-    pub fn probe(&self, arena: &Bump, start: &(PathStart, Stream)) -> Option<Probe> {
+    pub fn probe(&self, arena: &Bump, start: &CameraPathStart) -> Option<Probe> {
         let look = |vertex: &Vertex<'_, '_>| {
             let weight = vertex.throughput * vertex.shading.albedo(LobeSet::BROAD) * FRAC_1_PI;
             let direct = vertex.throughput * direct_light(self.scene, vertex, LobeSet::BROAD, LobeSet::empty(), 0.0);
@@ -75,20 +74,20 @@ impl CameraPaths<'_> {
     fn find<T>(
         &self,
         arena: &Bump,
-        (start, stream): &(PathStart, Stream),
+        start: &CameraPathStart,
         look: impl FnMut(&Vertex<'_, '_>) -> T,
     ) -> Option<(GatherPoint, T)> {
         let mut find = Find { look, found: None, length: 0.0 };
-        walk(self.scene, arena, start, *stream, Transport::Radiance, self.max_depth, &mut find);
+        walk(self.scene, arena, &start.ray, start.stream, Transport::Radiance, self.max_depth, &mut find);
         find.found
     }
 }
 
 impl CameraPaths<'_> {
     /// The first point in a scattering medium on a camera path; `None` if there is none.
-    pub fn volume_point(&self, arena: &Bump, (start, stream): &(PathStart, Stream)) -> Option<GatherPoint> {
+    pub fn volume_point(&self, arena: &Bump, start: &CameraPathStart) -> Option<GatherPoint> {
         let mut find = FindVolumePoint { found: None, length: 0.0 };
-        walk(self.scene, arena, start, *stream, Transport::Radiance, self.max_depth, &mut find);
+        walk(self.scene, arena, &start.ray, start.stream, Transport::Radiance, self.max_depth, &mut find);
         find.found
     }
 }
