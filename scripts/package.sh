@@ -1,28 +1,58 @@
 #!/usr/bin/env bash
-# Makes packages that need no compiler and no other libraries: Linux on x86-64 with glibc 2.28 or newer.
+# Makes packages that need no compiler and no other libraries.
 #
-#   scripts/package.sh            in target/package: caustique-VERSION-linux-x86_64.tar.gz, the Python wheel
-#                                 caustique-VERSION-cp310-abi3-manylinux_2_28_x86_64.whl, and the extension
-#                                 caustique-VERSION-blender.zip, which contains that wheel
+#   scripts/package.sh                   for Linux on x86-64 with glibc 2.28 or newer, in target/package:
+#                                        caustique-VERSION-linux-x86_64.tar.gz, the Python wheel
+#                                        caustique-VERSION-cp310-abi3-manylinux_2_28_x86_64.whl, and the extension
+#                                        caustique-VERSION-blender.zip, which contains that wheel
+#   scripts/package.sh --target SYSTEM   the archive alone for another system: windows-x86_64 (.zip), linux-aarch64 or
+#                                        macos-aarch64 (.tar.gz)
 #
-# Each holds Embree, Open Image Denoise, TBB and ONNX Runtime, with licences and notices. Zig links the program to the
-# symbols of glibc 2.28, and auditwheel checks the wheel.
+# Each holds Embree, Open Image Denoise, TBB and ONNX Runtime, with licences and notices, as far as they exist for the
+# system. Zig links the program to the symbols of glibc 2.28, and for macOS 14; mingw-w64 links it for Windows. auditwheel
+# checks the wheel. Without a toolchain for a system, the script says which one it lacks.
 # CAUSTIQUE_RUSTFLAGS are more flags for rustc, such as those of profile-guided optimisation.
 
 set -euo pipefail
 # shellcheck source=scripts/setup.sh
 . "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 cd "$ROOT"
-setup package
 
 GLIBC=2.28
-TARGET=x86_64-unknown-linux-gnu
+system=linux-x86_64
+[ "${1:-}" != --target ] || system=${2:-}
+# pip: options by which pip finds the wheels of the system; linker: more flags for rustc
+pip=()
+linker=
+case $system in
+linux-x86_64) triple=x86_64-unknown-linux-gnu cpu=x86-64-v3 ;;
+linux-aarch64)
+    triple=aarch64-unknown-linux-gnu cpu=generic
+    pip=(--platform manylinux_2_28_aarch64 --platform manylinux_2_27_aarch64)
+    ;;
+windows-x86_64)
+    triple=x86_64-pc-windows-gnu cpu=x86-64-v3 pip=(--platform win_amd64)
+    # As in .cargo/config.toml.
+    linker='-C link-args=-static -C link-args=-Wl,--stack,8388608'
+    ;;
+macos-aarch64)
+    triple=aarch64-apple-darwin cpu=apple-m1
+    pip=(--platform macosx_14_0_arm64 --platform macosx_13_0_arm64 --platform macosx_12_0_arm64)
+    ;;
+*) fail "unknown system '$system'" "one of: linux-x86_64 linux-aarch64 windows-x86_64 macos-aarch64" ;;
+esac
+setup package
+need_target "$triple"
+[ "$system" != windows-x86_64 ] || need_mingw
+
 version=$(sed -n 's/^version *= *"\([0-9.]*\)".*/\1/p' Cargo.toml | head -n 1)
 out=$ROOT/target/package
 PATH=$ROOT/.venv-package/bin:$PATH
 # The environment's flags replace those of .cargo/config.toml.
-export RUSTFLAGS="-C target-cpu=x86-64-v3 ${CAUSTIQUE_RUSTFLAGS:-}" CARGO_TARGET_DIR=$out/build
+export RUSTFLAGS="-C target-cpu=$cpu $linker ${CAUSTIQUE_RUSTFLAGS:-}" CARGO_TARGET_DIR=$out/build
 export CARGO_INCREMENTAL=0 CARGO_PROFILE_RELEASE_STRIP=symbols CARGO_PROFILE_RELEASE_DEBUG=none
+# The oldest macOS for which there is a wheel of ONNX Runtime.
+export MACOSX_DEPLOYMENT_TARGET=14.0
 CAUSTIQUE_COMMIT=$(git rev-parse --short=12 HEAD 2>/dev/null || echo unknown)
 [ -z "$(git status --porcelain --untracked-files=no 2>/dev/null)" ] || CAUSTIQUE_COMMIT+=-modified
 # Equal commits give equal dates in the archives.
@@ -36,38 +66,61 @@ notices=$tree/share/doc/caustique
 
 say "collecting the libraries"
 mkdir -p "$work/wheels" "$out"
-for name in embree oidn onnxruntime; do
-    download_wheel "$name" .venv-package "$work/wheels"
+wheels=(embree oidn onnxruntime)
+[ "$system" != linux-aarch64 ] || wheels=(onnxruntime)
+for name in "${wheels[@]}"; do
+    download_wheel "$name" .venv-package "$work/wheels" "${pip[@]}"
 done
-python -I scripts/package_libraries.py "$work/wheels" "$tree/lib/caustique" "$notices"
-python -I scripts/package_notices.py >"$notices/rust.txt"
+[ "$system" != windows-x86_64 ] || download_wheel msvc .venv-package "$work/wheels" "${pip[@]}" --python-version 3.14
+python -I scripts/package_libraries.py "$system" "$work/wheels" "$tree/lib/caustique" "$notices"
+python -I scripts/package_notices.py "$triple" >"$notices/rust.txt"
 cp scripts/notices/ltc-sheen.txt "$notices/"
 
-say "building the program and the Python module"
-# Together, because the module needs more features of some crates, which would otherwise be compiled twice. The module
-# must not name a libpython: the Python that loads it has the symbols.
+say "building the program"
 export PYO3_BUILD_EXTENSION_MODULE=1 PYO3_PYTHON=$ROOT/.venv-package/bin/python
-cargo-zigbuild zigbuild --quiet --locked --release --target "$TARGET.$GLIBC" \
-    --package caustique --bin caustique --package caustique-python --lib
-built=$CARGO_TARGET_DIR/$TARGET/release
+build=(--quiet --locked --release --package caustique --bin caustique)
+case $system in
+# The program and the Python module together, because the module needs more features of some crates, which would
+# otherwise be compiled twice. The module must not name a libpython: the Python that loads it has the symbols.
+linux-x86_64) cargo-zigbuild zigbuild --target "$triple.$GLIBC" "${build[@]}" --package caustique-python --lib ;;
+linux-*) cargo-zigbuild zigbuild --target "$triple.$GLIBC" "${build[@]}" ;;
+macos-*) cargo-zigbuild zigbuild --target "$triple" "${build[@]}" ;;
+windows-*) cargo build --target "$triple" "${build[@]}" ;;
+esac
+built=$CARGO_TARGET_DIR/$triple/release
 program=$built/caustique
+[ "$system" != windows-x86_64 ] || program+=.exe
 
-say "making the tarball"
-mkdir -p "$tree/bin" "$tree/share/caustique/scenes" "$tree/share/man/man1" "$tree/share/zsh/site-functions" \
-    "$tree/share/bash-completion/completions" "$tree/share/fish/vendor_completions.d"
+say "making the archive"
+mkdir -p "$tree/bin" "$tree/share/caustique/scenes"
 cp "$program" "$tree/bin/"
 cp scenes/*.glb "$tree/share/caustique/scenes/"
 cp README.md CHANGELOG.md CITATION.cff "$notices/"
-"$program" completions bash >"$tree/share/bash-completion/completions/caustique"
-"$program" completions zsh >"$tree/share/zsh/site-functions/_caustique"
-"$program" completions fish >"$tree/share/fish/vendor_completions.d/caustique.fish"
-"$program" man >"$tree/share/man/man1/caustique.1"
-for command in $("$program" man | sed -n 's/^caustique\\-\([a-z]*\)(1)$/\1/p' | grep -v help); do
-    "$program" man "$command" >"$tree/share/man/man1/caustique-$command.1"
-done
-archive=$out/caustique-$version-linux-x86_64.tar.gz
-tar -C "$work" --sort=name --owner=0 --group=0 --numeric-owner --mode=u+w,go-w,a+rX --mtime="@$SOURCE_DATE_EPOCH" \
-    -cf - "caustique-$version" | gzip -9n >"$archive"
+# The program of this machine writes the manual; a package for Windows has none.
+native=$CARGO_TARGET_DIR/$(rustc -vV | sed -n 's/^host: //p')/release/caustique
+if [ "$system" != windows-x86_64 ] && [ -x "$native" ]; then
+    mkdir -p "$tree/share/man/man1" "$tree/share/zsh/site-functions" "$tree/share/bash-completion/completions" \
+        "$tree/share/fish/vendor_completions.d"
+    "$native" completions bash >"$tree/share/bash-completion/completions/caustique"
+    "$native" completions zsh >"$tree/share/zsh/site-functions/_caustique"
+    "$native" completions fish >"$tree/share/fish/vendor_completions.d/caustique.fish"
+    "$native" man >"$tree/share/man/man1/caustique.1"
+    for command in $("$native" man | sed -n 's/^caustique\\-\([a-z]*\)(1)$/\1/p' | grep -v help); do
+        "$native" man "$command" >"$tree/share/man/man1/caustique-$command.1"
+    done
+fi
+archive=$out/caustique-$version-$system.tar.gz
+if [ "$system" = windows-x86_64 ]; then
+    archive=${archive%.tar.gz}.zip
+    python -I scripts/package_zip.py "$work" "$archive"
+else
+    tar -C "$work" --sort=name --owner=0 --group=0 --numeric-owner --mode=u+w,go-w,a+rX --mtime="@$SOURCE_DATE_EPOCH" \
+        -cf - "caustique-$version" | gzip -9n >"$archive"
+fi
+if [ "$system" != linux-x86_64 ]; then
+    printf '%s  %s\n' "$(du -h "$archive" | cut -f 1)" "$archive"
+    exit
+fi
 
 say "making the wheel"
 inside=$work/inside

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Copies Embree, Open Image Denoise, TBB and ONNX Runtime from Python wheels into a package, with their notices.
 
-    package_libraries.py WHEELS LIBRARIES NOTICES
+    package_libraries.py SYSTEM WHEELS LIBRARIES NOTICES
 
-WHEELS is a folder with the wheels of embreex, pyoidn and onnxruntime. Embree and Open Image Denoise share the newer one
-of their TBBs. It gets a name of its own, so that another TBB in a process does not replace it, and each library finds
-the others in its folder. Needs patchelf.
+SYSTEM is one of those in LIBRARIES. WHEELS is a folder with the wheels of embreex, pyoidn and onnxruntime, and for
+Windows of msvc-runtime. On Linux and Windows, Embree and Open Image Denoise share the newer one of their TBBs. On Linux
+it gets a name of its own, so that another TBB in a process does not replace it, and each library finds the others in
+its folder; this needs patchelf. On macOS nothing may be changed in a signed library, so each has its own TBB.
 """
 
 import re
@@ -17,31 +18,75 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 TBB = "libtbb-caustique.so.12"
-#: For each wheel: patterns of its libraries, and their names in the package (None: the name in the wheel).
+#: For each system and wheel: patterns of its libraries, and their names in the package (None: the name in the
+#: wheel; FOLDER/: that name in a folder).
 LIBRARIES = {
-    "embreex": {r"embreex\.libs/libembree4-[0-9a-f]+\.so\.4": "libembree4.so.4"},
-    "pyoidn": {
-        r"pyoidn/oidn/lib/libOpenImageDenoise\.so\.\d+\.\d+\.\d+": None,
-        r"pyoidn/oidn/lib/libOpenImageDenoise_core\.so\.\d+\.\d+\.\d+": None,
-        r"pyoidn/oidn/lib/libOpenImageDenoise_device_cpu\.so\.\d+\.\d+\.\d+": None,
-        r"pyoidn/oidn/lib/libtbb\.so\.12\.\d+": TBB,
+    "linux-x86_64": {
+        "embreex": {r"embreex\.libs/libembree4-[0-9a-f]+\.so\.4": "libembree4.so.4"},
+        "pyoidn": {
+            r"pyoidn/oidn/lib/libOpenImageDenoise\.so\.\d+\.\d+\.\d+": None,
+            r"pyoidn/oidn/lib/libOpenImageDenoise_core\.so\.\d+\.\d+\.\d+": None,
+            r"pyoidn/oidn/lib/libOpenImageDenoise_device_cpu\.so\.\d+\.\d+\.\d+": None,
+            r"pyoidn/oidn/lib/libtbb\.so\.12\.\d+": TBB,
+        },
+        "onnxruntime": {r"onnxruntime/capi/libonnxruntime\.so\.\d+\.\d+\.\d+": None},
     },
-    "onnxruntime": {r"onnxruntime/capi/libonnxruntime\.so\.\d+\.\d+\.\d+": None},
+    # There are no wheels of Embree and Open Image Denoise.
+    "linux-aarch64": {"onnxruntime": {r"onnxruntime/capi/libonnxruntime\.so\.\d+\.\d+\.\d+": None}},
+    "windows-x86_64": {
+        "embreex": {r"embreex\.libs/embree4\.dll": None, r"embreex\.libs/msvcp140-[0-9a-f]+\.dll": None},
+        "pyoidn": {
+            r"pyoidn/oidn/bin/OpenImageDenoise\.dll": None,
+            r"pyoidn/oidn/bin/OpenImageDenoise_core\.dll": None,
+            r"pyoidn/oidn/bin/OpenImageDenoise_device_cpu\.dll": None,
+            r"pyoidn/oidn/bin/tbb12\.dll": None,
+        },
+        "onnxruntime": {r"onnxruntime/capi/onnxruntime\.dll": None},
+        "msvc_runtime": {
+            rf"msvc_runtime-[^/]*/data/Scripts/{name}\.dll": None
+            for name in ("msvcp140", "msvcp140_1", "vcruntime140", "vcruntime140_1")},
+    },
+    "macos-aarch64": {
+        "embreex": {r"embreex/\.dylibs/libembree4\.\d+\.dylib": None, r"embreex/\.dylibs/libtbb\.12\.\d+\.dylib": None},
+        # Its libraries find each other in "../lib".
+        "pyoidn": {
+            r"pyoidn/oidn/lib/libOpenImageDenoise\.2\.dylib": "lib/",
+            r"pyoidn/oidn/lib/libOpenImageDenoise_core\.\d+\.\d+\.\d+\.dylib": "lib/",
+            r"pyoidn/oidn/lib/libOpenImageDenoise_device_cpu\.\d+\.\d+\.\d+\.dylib": "lib/",
+            r"pyoidn/oidn/lib/libOpenImageDenoise_device_metal\.\d+\.\d+\.\d+\.dylib": "lib/",
+            r"pyoidn/oidn/lib/libtbb\.12\.dylib": "lib/",
+        },
+        "onnxruntime": {r"onnxruntime/capi/libonnxruntime\.\d+\.\d+\.\d+\.dylib": None},
+    },
 }
 #: Notices in the wheel of ONNX Runtime. Those of the others are in scripts/notices.
 NOTICES = {"onnxruntime/LICENSE": "onnxruntime-licence.txt", "onnxruntime/ThirdPartyNotices.txt": "onnxruntime.txt"}
 README = """\
 caustique is under MIT or Apache-2.0, at your choice (LICENSE-MIT, LICENSE-APACHE). This package also contains
 
-    Embree                Apache-2.0 (LICENSE-APACHE)     embree.txt
-    Open Image Denoise    Apache-2.0 (LICENSE-APACHE)     oidn.txt
-    oneTBB                Apache-2.0 (LICENSE-APACHE)     tbb.txt
-    ONNX Runtime          MIT (onnxruntime-licence.txt)   onnxruntime.txt
-    Rust libraries        each under its own licence      rust.txt
-
-The files in the last column hold the notices of the parts that they contain. File names and search paths in these
-libraries were changed, so that they find each other in this package; nothing else was.
+%s
+The files in the last column hold the notices of the parts that they contain.
 """
+#: The wheel of each part (None: it is in the program), and the line about it.
+PARTS = (
+    ("embreex", "Embree                Apache-2.0 (LICENSE-APACHE)     embree.txt"),
+    ("pyoidn", "Open Image Denoise    Apache-2.0 (LICENSE-APACHE)     oidn.txt"),
+    ("pyoidn", "oneTBB                Apache-2.0 (LICENSE-APACHE)     tbb.txt"),
+    ("onnxruntime", "ONNX Runtime          MIT (onnxruntime-licence.txt)   onnxruntime.txt"),
+    (None, "Rust libraries        each under its own licence      rust.txt"),
+)
+#: The end of that text.
+CHANGES = {
+    "linux": """\
+File names and search paths in these libraries were changed, so that they find each other in this package; nothing else
+was.
+""",
+    "windows": """\
+The libraries are unchanged. msvcp140*.dll and vcruntime140*.dll are Microsoft's runtime of Visual C++, distributed as
+its licence allows.
+""",
+    "macos": "The libraries are unchanged.\n",
+}
 
 
 def run(*words):
@@ -82,24 +127,28 @@ def relocate(library):
 
 
 def main():
-    wheels, libraries, notices = map(Path, sys.argv[1:])
+    system = sys.argv[1]
+    wheels, libraries, notices = map(Path, sys.argv[2:])
     libraries.mkdir(parents=True)
     notices.mkdir(parents=True)
-    for package, wanted in LIBRARIES.items():
+    for package, wanted in LIBRARIES[system].items():
         with wheel_of(wheels, package) as archive:
             for pattern, name in wanted.items():
                 member = member_of(archive, pattern)
-                library = libraries / (name or Path(member).name)
+                library = libraries / (f"{name or ''}{Path(member).name}" if (name or "/").endswith("/") else name)
+                library.parent.mkdir(exist_ok=True)
                 copy(archive, member, library)
-                relocate(library)
+                if system.startswith("linux"):
+                    relocate(library)
             for member in NOTICES.keys() & set(archive.namelist()):
                 copy(archive, member, notices / NOTICES[member])
     for source in [*ROOT.glob("scripts/notices/*.txt"), *ROOT.glob("LICENSE-*")]:
         shutil.copy(source, notices)
-    (notices / "README.txt").write_text(README, encoding="utf-8")
+    parts = "".join(f"    {line}\n" for wheel, line in PARTS if wheel is None or wheel in LIBRARIES[system])
+    (notices / "README.txt").write_text(README % parts + CHANGES[system.split("-")[0]], encoding="utf-8")
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 4:
+    if len(sys.argv) != 5 or sys.argv[1] not in LIBRARIES:
         sys.exit(__doc__)
     main()

@@ -1,25 +1,25 @@
 #!/usr/bin/env python3
 """Prints the licences of the Rust libraries that are linked into the program and the Python module.
 
-    package_notices.py
+    package_notices.py TARGET
 
 Equal texts are printed once, with the libraries that they belong to. Needs cargo.
 """
 
 import json
 import subprocess
+import sys
 from collections import defaultdict
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PATTERNS = ("LICEN[CS]E*", "COPYING*", "COPYRIGHT*", "NOTICE*", "UNLICENSE*")
-TARGET = "x86_64-unknown-linux-gnu"
 
 
 def metadata():
     """Returns the crates of the workspace and their dependencies for the released target, as `cargo metadata` prints
     them."""
-    words = ["cargo", "metadata", "--locked", "--format-version", "1", "--filter-platform", TARGET]
+    words = ["cargo", "metadata", "--locked", "--format-version", "1", "--filter-platform", sys.argv[1]]
     return json.loads(subprocess.run(words, cwd=ROOT, check=True, stdout=subprocess.PIPE).stdout)
 
 

@@ -113,6 +113,21 @@ need_rust() {
             "run 'rustup update stable'; where Rust came from apt, install rustup: https://rustup.rs"
 }
 
+# has_target TRIPLE: whether Rust can build for another system, if need be after fetching its standard library
+has_target() {
+    [ -d "$(rustc --print target-libdir --target "$1")" ] || rustup -q target add "$1" 2>/dev/null
+}
+
+# need_target TRIPLE
+need_target() {
+    has_target "$1" || fail "there is no standard library of Rust for $1" "run 'rustup target add $1'"
+}
+
+# need_mingw: the compiler and the linker for Windows
+need_mingw() {
+    command -v x86_64-w64-mingw32-g++ >/dev/null || apt_install g++-mingw-w64-x86-64-posix mingw-w64-x86-64-dev
+}
+
 links() { printf 'int main(void) { return 0; }\n' | cc -x c -o /dev/null - -lm 2>/dev/null; }
 
 need_linker() {
@@ -161,11 +176,12 @@ need_venv_module() {
 # find_library NAME: prints version and path
 find_library() { "$PYTHON" "$ROOT/scripts/setup_library.py" "$1"; }
 
-# download_wheel NAME VENV FOLDER: the wheel that requirements-NAME.txt lists, by the pip of a virtual environment. The
-# libraries in the wheels do not depend on the Python version; naming a version makes pip accept the wheel with any.
+# download_wheel NAME VENV FOLDER [OPTION...]: the wheel that requirements-NAME.txt lists, by the pip of a virtual
+# environment with more options. The libraries in the wheels do not depend on the Python version; naming a version makes
+# pip accept the wheel with any.
 download_wheel() {
     "$2/bin/python" -I -m pip download -q --disable-pip-version-check --no-deps --only-binary=:all: \
-        --require-hashes --python-version 3.11 -d "$3" -r "$ROOT/scripts/requirements-$1.txt" >&2
+        --require-hashes --python-version 3.11 "${@:4}" -d "$3" -r "$ROOT/scripts/requirements-$1.txt" >&2
 }
 
 # fetch_library NAME TEMPORARY

@@ -174,6 +174,15 @@ rust=(cargo test --locked --release --workspace --no-fail-fast --lib --bins --te
 tests 'cargo test' "${rust[@]}"
 part 'cargo test --doc' cargo test --locked --release --workspace --doc
 join_beside
+# For Windows, a minute and a half. Compilers of C have nothing to do: checking Rust needs no objects.
+if [ ${#hard_cases[@]} -gt 0 ]; then
+    without 'cargo check, Windows' 'scripts/test.sh --long runs it'
+elif has_target x86_64-pc-windows-gnu; then
+    part 'cargo check, Windows' env {CC,CXX,AR}_x86_64_pc_windows_gnu=true RUSTFLAGS='-D warnings' \
+        cargo check --quiet --locked --target x86_64-pc-windows-gnu --bin caustique
+else
+    without 'cargo check, Windows' 'it needs Rust for Windows: rustup target add x86_64-pc-windows-gnu'
+fi
 if [ "$SECONDS" -lt "$long_within" ]; then
     tests 'cargo test, long' "${rust[@]}" --ignored
     other_blenders CAUSTIQUE_LONG=1

@@ -1,0 +1,108 @@
+#!/usr/bin/env bash
+# Tests the package for Windows under Debian's wine.
+#
+#   tests/wine.sh PACKAGES [PROGRAM]    PACKAGES is the folder with the zip of scripts/package.sh --target windows-x86_64;
+#                                       PROGRAM renders the pictures to compare with, by default the one of the package
+#                                       for Linux
+#
+# The last lines give the time to the first picture and the differences from Linux's pictures, and count the checks.
+
+set -euo pipefail
+
+# shellcheck source=scripts/setup.sh
+. "$(dirname "${BASH_SOURCE[0]}")/../scripts/setup.sh"
+
+packages=$(cd "$1" && pwd)
+native=$(realpath "${2:-$packages/build/x86_64-unknown-linux-gnu/release/caustique}")
+[ -x "$native" ] || fail "$native is not there" "scripts/package.sh makes it; or name a program"
+need_mingw
+[ -x /usr/lib/wine/wine64 ] || apt_install wine64
+work=$(mktemp -d)
+export WINEPREFIX=$work/wine WINEDEBUG=-all
+wine() { /usr/lib/wine/wine64 "$@"; }
+trap '/usr/lib/wine/wineserver64 -k 2>/dev/null || true; rm -rf "$work"' EXIT
+cd "$work"
+passed=0 failed=0 notes=()
+
+# check NAME COMMAND...: counts a command that must succeed, and shows its output if it does not
+check() {
+    if "${@:2}" >check.log 2>&1; then
+        passed=$((passed + 1))
+    else
+        failed=$((failed + 1))
+        printf 'FAILED %s\n' "$1"
+        cat check.log
+    fi
+}
+no() { ! "$@"; }
+# says PATTERN COMMAND...: succeeds if the command does, and prints a line that matches
+says() { "${@:2}" >said && cat said && grep -Eq -- "$1" said; }
+holds() { local file; for file; do [ -s "$file" ] || { echo "$file: missing or empty" && return 1; }; done; }
+
+say "preparing wine"
+wine wineboot -i >/dev/null 2>&1
+# Rust's standard library takes random numbers from a function that wine 8 lacks.
+cat >prng.c <<'C'
+#include <windows.h>
+BOOLEAN NTAPI SystemFunction036(PVOID, ULONG);
+__declspec(dllexport) BOOL WINAPI ProcessPrng(PBYTE data, SIZE_T length)
+{
+    return SystemFunction036(data, (ULONG)length);
+}
+C
+x86_64-w64-mingw32-gcc -shared -o "$WINEPREFIX/drive_c/windows/system32/bcryptprimitives.dll" prng.c -ladvapi32
+
+start=$SECONDS
+mkdir 'ein schöner Ort'
+python3 -m zipfile -e "$packages"/caustique-*-windows-x86_64.zip 'ein schöner Ort'
+home=$(echo "$work/ein schöner Ort"/caustique-*)
+caustique() { wine "$home/bin/caustique.exe" "$@"; }
+scenes=$home/share/caustique/scenes
+picture=(--width 160 --iterations 8 --seed 3 --denoise oidn --strict --progress none --reproducible)
+small=(--width 32 --iterations 2 --progress none)
+
+check 'render' caustique render "$scenes/pool.glb" -o pool.exr --png pool.png "${picture[@]}"
+notes+=("$((SECONDS - start)) s from the download to the first picture")
+check 'pictures' holds pool.exr pool.png
+check '--version' says '^Embree 4.*lib.caustique.embree4.dll' caustique --version
+for library in 'Embree ' 'ONNX Runtime ' 'Open Image Denoise '; do
+    check "doctor: $library" says "^$library.*from package" caustique doctor
+done
+check 'info' says pool caustique info "$scenes/pool.glb"
+check 'plan' says caustic caustique plan "$scenes/pool.glb"
+for scene in pool gems prism cornell; do
+    [ "$scene" = pool ] || check "render $scene" caustique render "$scenes/$scene.glb" -o "$scene.exr" "${picture[@]}"
+    check "Linux: $scene" "$native" render "$scenes/$scene.glb" -o "linux-$scene.exr" "${picture[@]}"
+    check "compare $scene" "$native" compare "$scene.exr" "linux-$scene.exr" --json
+    difference=$(sed -n 's/^  "relmse": \([^,]*\),*/\1/p' check.log)
+    notes+=("$scene: relMSE $difference from Linux's picture")
+    check "same picture: $scene" python3 -c 'import sys; sys.exit(not float(sys.argv[1]) < 1e-4)' "${difference:-1}"
+done
+check 'network' caustique render "$scenes/pool.glb" -o net.exr --model compact "${small[@]}"
+for i in 1 2; do check "shard $i" caustique render "$scenes/pool.glb" -o "shard$i.exr" --shard "$i/2" "${small[@]}"; done
+check 'merge' caustique merge shard1.exr shard2.exr -o merged.exr
+check 'animation' caustique render "$scenes/pool.glb" -o 'frame####.exr' --frames 1-2 "${small[@]}"
+check 'frames' holds frame0001.exr frame0002.exr
+check 'no claims are left' no compgen -G '*.claim'
+# A process that is killed leaves a claim and a checkpoint; the next one takes the frame, and the render.
+wine "$home/bin/caustique.exe" render "$scenes/pool.glb" -o 'long####.exr' --frames 1-1 --width 320 --time 600 \
+    --checkpoint-every 1 --progress none >killed.log 2>&1 &
+for _ in $(seq 120); do [ ! -e long0001.exr.claim ] || break; sleep 0.5; done
+check 'a claim while rendering' holds long0001.exr.claim
+kill -9 $!
+/usr/lib/wine/wineserver64 -k
+wait 2>/dev/null || true
+check 'a frame after a kill' caustique render "$scenes/pool.glb" -o 'long####.exr' --frames 1-1 "${small[@]}"
+check 'its picture' holds long0001.exr
+check 'its claim is gone' no test -e long0001.exr.claim
+check 'a missing file is an error' no caustique render missing.glb -o missing.exr
+if [ "$(id -u)" -eq 0 ] && mkdir full && mount -t tmpfs -o size=64k caustique-full full 2>/dev/null; then
+    check 'a full disk is an error' no caustique render "$scenes/pool.glb" -o full/pool.exr --width 640 --iterations 1 --progress none
+    check 'it says so' says 'make room' cat check.log
+    check 'and leaves no file' no compgen -G 'full/*'
+    umount full
+fi
+
+printf '%s\n' "${notes[@]}"
+printf '%d passed, %d failed\n' "$passed" "$failed"
+[ "$failed" -eq 0 ]
