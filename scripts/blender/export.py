@@ -79,10 +79,12 @@ def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None, onl
 
     with contextlib.ExitStack() as undo:
         _open_scene(scene, undo)
-        said, sun = {}, None
+        # The lighting mode of `_run_exporter`, so that the program need not guess it.
+        said, sun = {"light_units": "photometric"}, None
         if only is None:
             progress("Exporting the world")
-            said, sun = world.extras(scene, path, warn)
+            around, sun = world.extras(scene, path, warn)
+            said.update(around)
             said.update(guard.attempt(warn, f'scene "{scene.name}"', {}, "the picture has the program's own settings",
                                       camera_export.picture, scene, warn))
         progress("Exporting the objects")

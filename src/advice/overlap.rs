@@ -29,7 +29,10 @@ pub(super) fn overlapping_solids(scene: &Scene) -> Vec<String> {
             let other = &scene.shapes.instances[crossed as usize];
             let [own, its] = [instance, other].map(|i| materials[i.material as usize].priority);
             let pair = (instance.object.min(other.object), instance.object.max(other.object));
-            if pair.0 != pair.1 && instance.material != other.material && own == its && !pairs.contains(&pair) {
+            // Media without a surface of their own, such as smoke, are not meant to exclude others.
+            let refract = [instance, other].iter().all(|i| materials[i.material as usize].ior != 1.0);
+            let differ = pair.0 != pair.1 && instance.material != other.material;
+            if differ && own == its && refract && !pairs.contains(&pair) {
                 pairs.push(pair);
             }
         }

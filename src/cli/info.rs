@@ -20,7 +20,7 @@ const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 /// Show what a scene or an EXR contains
 #[derive(clap::Args)]
 pub struct InfoArgs {
-    /// Scene (.glb, .gltf, .usd, .usda, .usdc, .usdz) or EXR
+    /// Scene (.glb, .gltf, .blend, .usd, .usda, .usdc, .usdz) or EXR
     file: PathBuf,
     /// Allow a scene to name files (buffers, textures, its environment) outside its own folder
     #[arg(long)]

@@ -16,7 +16,7 @@ use std::str::FromStr;
 #[serde(rename_all = "kebab-case")]
 #[command(next_help_heading = "Light and glass")]
 pub struct SceneOptions {
-    /// Scene: .glb or .gltf, or a stage of USD (.usd, .usda, .usdc, .usdz)
+    /// Scene: .glb or .gltf, Blender's .blend, or a stage of USD (.usd, .usda, .usdc, .usdz)
     #[arg(value_name = "SCENE", help_heading = None::<&str>)]
     #[serde(rename = "scene", serialize_with = "lossy")]
     pub path: PathBuf,

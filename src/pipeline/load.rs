@@ -6,7 +6,7 @@ use crate::memory;
 use crate::path_class::EffectSet;
 use crate::plan::switch::{self, Removed};
 use crate::scene::description::{Description, EnvironmentDescription, EnvironmentSource};
-use crate::scene::{LightPreset, Scene, environment_file, gltf, light_preset, usd};
+use crate::scene::{LightPreset, Scene, blend, environment_file, gltf, light_preset, usd};
 use crate::stop::Stop;
 use std::path::PathBuf;
 
@@ -82,6 +82,9 @@ pub(super) fn read(
     check_memory(request, threads)?;
     if usd::is_stage(&request.path) {
         return Ok((usd::read(&request.path, &request.options, 0.0, stop)?, None));
+    }
+    if blend::is_blend(&request.path) {
+        return blend::read(&request.path, &request.options, stop);
     }
     gltf::MovingFile::open(&request.path, &request.options)
 }

@@ -1,9 +1,11 @@
 //! The scene: a reader turns a file into a plain [`Description`], which [`Scene::build`] turns into a [`Scene`].
 
+pub mod blend;
 mod build;
 mod camera_request;
 pub mod contact;
 mod contacts;
+pub mod converter;
 mod dense;
 pub mod description;
 mod edit;

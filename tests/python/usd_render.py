@@ -93,7 +93,7 @@ class Program(usd_support.Stages):
             program.send_signal(signal.SIGINT)
             said = program.stderr.read()
         self.assertEqual(program.returncode, 130, said)
-        self.assertIn(f"frame 2: {self.path}: interrupted while the stage was read\n", said)
+        self.assertIn(f"frame 2: {self.path}: interrupted while the scene was read\n", said)
         self.until(lambda: not self.converters())
         self.assertEqual(list(self.dir.glob("caustique-usd-*")), [])
 

@@ -15,7 +15,7 @@ use caustique::pipeline::{checkpoint, records, shard};
 use caustique::render::{Candidate, Control, Method, RenderInput, Session, Settings, StopReason, render};
 use caustique::scene::description::EnvironmentSource;
 use caustique::scene::gltf::{self, ReadOptions};
-use caustique::scene::{CameraRequest, Scene, environment_file, grid_file, ies, usd};
+use caustique::scene::{CameraRequest, Scene, converter, environment_file, grid_file, ies};
 use std::fs;
 use std::io::Write;
 use std::path::Path;
@@ -307,10 +307,10 @@ fn model(bytes: &[u8], folder: &Path) {
 
 /// The options that the USD converter reports.
 fn usd_options(bytes: &[u8], _: &Path) {
-    value_of(usd::answer::options(bytes, Path::new("fuzz.usda")));
+    value_of(converter::answer::options(bytes, Path::new("fuzz.usda")));
 }
 
 /// The message of the USD converter when it fails.
 fn usd_fault(bytes: &[u8], _: &Path) {
-    value_of::<()>(Err(usd::answer::failure(bytes, Path::new("fuzz.usda"))));
+    value_of::<()>(Err(converter::answer::failure(bytes, Path::new("fuzz.usda"), "scripts/usd")));
 }

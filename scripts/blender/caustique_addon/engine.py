@@ -99,7 +99,7 @@ class Engine(bpy.types.RenderEngine):
 
         output, preview = os.path.join(folder, "render.exr"), os.path.join(folder, "preview.exr")
         words = [path, "render", handoff.GLB, "--exr-naming", "blender", "--compression", "none",
-                 "--layers", passes.layers(passes.wanted(view_layer)), "--progress", "json",
+                 "--layers", passes.layers(passes.wanted(view_layer)), "--progress", "json", "--verbose",
                  *command.resolution(self.resolution_x, self.resolution_y), *command.threads(scene.render),
                  *command.method(scene.caustique_render)]
         saved = resume.Checkpoint([program.version(path), *words], folder)

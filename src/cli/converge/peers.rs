@@ -9,7 +9,7 @@ use caustique::options::SceneOptions;
 use caustique::peers::{Drivers, Renderer};
 use caustique::report::peer_renders::{Driver, PeerDenoiser, PeerRenders};
 use caustique::scene::gltf::{Glass, LightUnits};
-use caustique::scene::{View, usd};
+use caustique::scene::{View, blend, usd};
 
 /// Prepares the other renderers of `--with`; `None` if there are none.
 ///
@@ -71,5 +71,7 @@ fn unsupported(args: &ConvergeArgs) -> Option<String> {
         ("--max-depth", args.max_depth.is_some()),
     ];
     let given = option.iter().find(|(_, given)| *given).map(|(name, _)| format!("drivers do not know {name}"));
-    given.or_else(|| usd::is_stage(path).then(|| "drivers read no stages of USD".into()))
+    given
+        .or_else(|| usd::is_stage(path).then(|| "drivers read no stages of USD".into()))
+        .or_else(|| blend::is_blend(path).then(|| "drivers read no files of Blender; export one to .glb".into()))
 }

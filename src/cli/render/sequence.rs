@@ -10,7 +10,7 @@ use crate::cli::{events, output, say};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::options::{FrameSeed, Frames, is_pattern, path_of_frame};
 use caustique::pipeline::merge::is_shard;
-use caustique::scene::{gltf, usd};
+use caustique::scene::{blend, gltf, usd};
 use serde_json::json;
 
 /// Renders the frames in order. Ends at the first frame that fails, as Blender does; the frames before it are written.
@@ -98,7 +98,8 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
 /// Whether all of several frames show the same. The temporal finish averages frames, so it takes all of them.
 fn nothing_moves(args: &RenderArgs, frames: Frames) -> bool {
     let scene = &args.options.scene;
-    let is_one_file = !is_pattern(&scene.path) && !usd::is_stage(&scene.path);
+    let is_converted = usd::is_stage(&scene.path) || blend::is_blend(&scene.path);
+    let is_one_file = !is_pattern(&scene.path) && !is_converted;
     frames.single().is_none() && !args.temporal && is_one_file && gltf::is_still(&scene.path, &scene.request().options)
 }
 

@@ -164,6 +164,8 @@ pub struct MovingFile {
     shared: nodes::Shared,
     /// The meshes as they were read; empty unless motion vectors are to be computed.
     meshes: Vec<Arc<Mesh>>,
+    /// The temporary folder of the file, if it was converted from another format.
+    _folder: Option<tempfile::TempDir>,
 }
 
 /// Whether all frames of a file are the same: it has no animation, or its animations move nothing. `false` if the file
@@ -215,8 +217,14 @@ impl MovingFile {
             options: options.clone(),
             shared,
             meshes,
+            _folder: None,
         };
         Ok((description, kept.then(file)))
+    }
+
+    /// Keeps the temporary folder of the file for its moments.
+    pub(super) fn in_folder(self, folder: tempfile::TempDir) -> MovingFile {
+        MovingFile { _folder: Some(folder), ..self }
     }
 
     /// Parses the file for descriptions of its moments.

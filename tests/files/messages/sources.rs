@@ -10,7 +10,7 @@ const LOADERS: [&str; 10] = [
     "src/scene/folder.rs",
     "src/scene/environment_file.rs",
     "src/scene/usd/mod.rs",
-    "src/scene/usd/answer.rs",
+    "src/scene/converter",
     "src/image/exr/read.rs",
     "src/combine/model.rs",
     "src/combine/network.rs",
@@ -81,7 +81,7 @@ const UNSAID: [(&str, &[&str]); 7] = [
         &[
             "{} is no number of seconds",
             "give a whole number from 1 to 2000000, or none",
-            "interrupted while the stage was read",
+            "interrupted while the scene was read",
         ],
     ),
     (

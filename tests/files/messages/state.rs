@@ -9,7 +9,7 @@ use caustique::pipeline::checkpoint::{self, Head};
 use caustique::pipeline::records::{self, Record};
 use caustique::pipeline::shard::{self, ShardFile};
 use caustique::render::{MAX_SHARDS, Shard};
-use caustique::scene::usd::answer;
+use caustique::scene::converter::answer;
 use serde_json::json;
 use std::fs;
 use std::path::Path;
@@ -105,10 +105,13 @@ fn shards(said: &mut Said, folder: &Path) {
 fn stages(said: &mut Said) {
     let stage = Path::new("a.usda");
     said.case("a converter that says no options", &refused(answer::options(b"odd", stage)));
-    said.case("a converter that fails silently", &[message(&answer::failure(b"", stage))]);
-    said.case("a converter that fails", &[message(&answer::failure(b"Traceback\nKeyError: 'x'\n", stage))]);
+    said.case("a converter that fails silently", &[message(&answer::failure(b"", stage, "scripts/usd"))]);
+    said.case(
+        "a converter that fails",
+        &[message(&answer::failure(b"Traceback\nKeyError: 'x'\n", stage, "scripts/usd"))],
+    );
     let fault = br#"{"prim": "/World/Pool", "fault": "it is odd", "hint": "make it even"}"#;
-    said.case("a fault of a stage", &[message(&answer::failure(fault, stage))]);
+    said.case("a fault of a stage", &[message(&answer::failure(fault, stage, "scripts/usd"))]);
 }
 
 pub fn said() -> String {

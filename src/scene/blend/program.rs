@@ -1,0 +1,81 @@
+//! Finding a Blender, or a Python that has `bpy`.
+
+use crate::error::{Error, ErrorKind, Result};
+use crate::installed;
+use crate::system;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Environment variable with the path of a Blender, or of a Python that has `bpy`.
+pub const VARIABLE: &str = "CAUSTIQUE_BLENDER";
+
+/// The virtual environment with `bpy` that `scripts/setup.sh bpy` installs, in the project's folder.
+const ENVIRONMENT: &str = ".venv-bpy";
+
+/// Hint that ends errors about a missing Blender.
+pub(super) const HINT: &str = "install Blender 4.2 or newer, so that 'blender' is on the PATH, or run 'scripts/setup.sh \
+                               bpy', which installs Blender as a Python module; or set CAUSTIQUE_BLENDER to a Blender, \
+                               or to a Python in which 'pip install bpy' has been run";
+
+/// A Blender, or a Python that has `bpy`.
+#[derive(Clone, Debug)]
+pub struct Blender {
+    path: PathBuf,
+}
+
+impl Blender {
+    /// Finds the program: `CAUSTIQUE_BLENDER` if it is set; otherwise `blender` on the PATH; otherwise the Python in
+    /// `.venv-bpy` if `scripts/setup.sh bpy` has installed it (see [`installed`]).
+    ///
+    /// # Errors
+    /// [`ErrorKind::Library`]: there is none, or the variable is set, but not to a file.
+    pub fn find() -> Result<Blender> {
+        if let Some(path) = installed::path_from_env(VARIABLE) {
+            // The converter starts in another folder.
+            return match std::path::absolute(&path) {
+                Ok(path) if path.is_file() => Ok(Blender { path }),
+                _ => {
+                    Err(Error::new(ErrorKind::Library, format!("{VARIABLE}={}", path.display()), "no such file")
+                        .hint(HINT))
+                }
+            };
+        }
+        let own = || installed::find(&format!("{ENVIRONMENT}/{}", system::PYTHON_OF_ENVIRONMENT));
+        let path = on_search_path("blender").or_else(own);
+        path.map(|path| Blender { path }).ok_or_else(|| {
+            Error::new(ErrorKind::Library, "", "reading a .blend needs Blender, and none is installed").hint(HINT)
+        })
+    }
+
+    /// The path of the program.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// How the program was found, in words.
+    pub fn origin(&self) -> &'static str {
+        installed::origin(VARIABLE, ENVIRONMENT, &self.path)
+    }
+
+    /// A command that runs `script` without the user's settings. Blender runs no Python in the files that it opens.
+    pub(super) fn command(&self, script: &Path) -> Command {
+        let mut command = Command::new(&self.path);
+        let name = self.path.file_name().unwrap_or_default().to_string_lossy();
+        if name.starts_with("python") {
+            // Isolated, because modules in the current folder may come from an untrusted source.
+            command.args(["-I", "-B"]).arg(script);
+        } else {
+            command.args(["-b", "--factory-startup", "--disable-autoexec", "-noaudio", "--python-exit-code", "1"]);
+            command.arg("--python").arg(script);
+        }
+        command.arg("--");
+        command
+    }
+}
+
+/// The first program of this name in the absolute folders of the PATH: the current folder may hold files of other users.
+fn on_search_path(name: &str) -> Option<PathBuf> {
+    let folders = std::env::var_os("PATH")?;
+    let mut paths = std::env::split_paths(&folders).filter(|folder| folder.is_absolute()).map(|it| it.join(name));
+    paths.find(|path| path.is_file())
+}
