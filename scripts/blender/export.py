@@ -117,6 +117,7 @@ def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None, onl
     _put_active_camera_first(document, scene)
     buffer = motion_gltf.write(document, buffer, flat.motion, bodies_of_nodes, warn)
     said.update(motion_gltf.scene_keys(flat.motion))
+    _warn_of_refused_drivers(scene, warn)
     said["losses"] = warnings
     document["scenes"][document.get("scene", 0)].setdefault("extras", {})["caustique"] = said
     used = {name for part in document.get("materials", []) for name in part.get("extensions", {})}
@@ -258,6 +259,13 @@ def _warn_of_immersed_camera(flat, bodies, warn):
         if found and (inside - at).dot(normal) < 0:
             warn(flat.where(camera), f"it is inside {flat.where(thing)}: if that has an index n, the picture is n^2 times "
                  "as bright as in Cycles (1.77 times in water), as radiance is; lower the exposure to see the same")
+
+
+def _warn_of_refused_drivers(scene, warn):
+    """Warn if Blender has refused to run the Python of a driver in the file."""
+    if bpy.app.autoexec_fail and bpy.app.autoexec_fail_message.startswith("Driver"):
+        warn(f'scene "{scene.name}"', f"Python in the file does not run ({bpy.app.autoexec_fail_message}), and what it "
+             "drives keeps its last value: use a simple expression, or bake the values to keyframes")
 
 
 def _leaning_share(mesh):

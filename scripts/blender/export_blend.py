@@ -9,6 +9,8 @@ because the program has ended then, and removes its own folder, which the progra
 """
 
 import argparse
+import glob
+import itertools
 import json
 import os
 import resource
@@ -21,6 +23,8 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
 _HERE = os.path.dirname(os.path.abspath(__file__))
 _OLDEST = (4, 2, 0)  # the exporter needs the materials and the glTF exporter of this version
+# Patterns for the tokens that stand for the number of a tile in the path of a texture.
+_TILES = {"<UDIM>": "[0-9]" * 4, "<UVTILE>": "u[0-9]*_v[0-9]*"}
 _CHOOSE = "set CAUSTIQUE_BLENDER to another Blender, or to a Python in which 'pip install bpy' has been run"
 
 
@@ -92,15 +96,24 @@ def files_of(bpy, allow_outside):
     own = os.path.realpath(bpy.data.filepath)
     bundled = os.path.realpath(bpy.utils.system_resource("DATAFILES") or own)
     found = {own}
-    for path in bpy.utils.blend_paths(absolute=True):
-        path = os.path.realpath(path)
-        if not os.path.isfile(path) or _lies_in(path, bundled):
+    named = (_existing(path) for path in bpy.utils.blend_paths(absolute=True))
+    for path in map(os.path.realpath, itertools.chain.from_iterable(named)):
+        if _lies_in(path, bundled):
             continue
         if not (allow_outside or _lies_in(path, os.path.dirname(own))):
             raise Fault(f"it names the file {path}, which is outside its folder",
                         "pack the file into the .blend, put it beside it, or allow such files with --allow-outside")
-        found.add(path)
+        if os.path.isfile(path):
+            found.add(path)
     return sorted(found)
+
+
+def _existing(path):
+    """The files and folders that a path in a .blend stands for: a path with a token stands for all tiles of a texture."""
+    pattern = glob.escape(path)
+    for token, tiles in _TILES.items():
+        pattern = pattern.replace(token, tiles)
+    return glob.glob(pattern)
 
 
 def _lies_in(path, folder):

@@ -1,15 +1,16 @@
-//! `caustique doctor`: finds the libraries that the program loads, and the Python that reads USD.
+//! `caustique doctor`: finds the libraries that the program loads, and the programs that read USD and Blender files.
 
 use super::{print, print_json};
 use caustique::combine::Runtime;
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::finish::denoiser;
+use caustique::scene::blend::Blender;
 use caustique::scene::usd::Interpreter;
 use caustique::trace;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Show which Embree, ONNX Runtime, Open Image Denoise and USD are found, their files and versions, and how to install
+/// Show which Embree, ONNX Runtime, Open Image Denoise, USD and Blender are found, their files and versions, and how to install
 /// missing ones
 #[derive(clap::Args)]
 pub struct DoctorArgs {
@@ -47,7 +48,7 @@ struct Found(String, String, &'static str);
 
 /// Prints the libraries that were found and those that are missing. Returns an error if a required one is missing.
 pub fn run(args: &DoctorArgs) -> Result<()> {
-    let findings = [embree(), onnxruntime(), oidn(), usd()];
+    let findings = [embree(), onnxruntime(), oidn(), usd(), blender()];
     if args.json {
         let mut object = serde_json::Map::new();
         object.insert("version".into(), env!("CARGO_PKG_VERSION").into());
@@ -104,6 +105,12 @@ fn usd() -> Finding {
         Interpreter::find().and_then(|python| Ok(Found(python.version()?, show(python.path()), python.origin())));
     let found = found.map_err(|error| (error.to_string(), error.hint));
     Finding { name: "USD", key: "usd", needed_for: "read .usd files", optional: true, found }
+}
+
+fn blender() -> Finding {
+    let found = Blender::find().and_then(|it| Ok(Found(it.version()?, show(it.path()), it.origin())));
+    let found = found.map_err(|error| (error.to_string(), error.hint));
+    Finding { name: "Blender", key: "blender", needed_for: "read .blend files", optional: true, found }
 }
 
 fn show(path: &Path) -> String {

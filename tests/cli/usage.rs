@@ -483,10 +483,10 @@ fn missing_libraries_are_named_before_rendering() {
     }
     let well = folder.run("doctor");
     assert_eq!((well.code, well.stderr.as_str()), (Some(0), ""));
-    // Whether USD is found does not matter to the exit code.
-    let names = ["caustique ", "Embree ", "ONNX Runtime ", "Open Image Denoise ", "USD "];
+    // Whether USD and Blender are found does not matter to the exit code.
+    let names = ["caustique ", "Embree ", "ONNX Runtime ", "Open Image Denoise ", "USD ", "Blender "];
     let lines: Vec<&str> = well.stdout.lines().collect();
-    assert!(lines.len() >= 5 && lines.iter().zip(names).all(|(line, name)| line.starts_with(name)), "{lines:?}");
+    assert!(lines.len() >= 6 && lines.iter().zip(names).all(|(line, name)| line.starts_with(name)), "{lines:?}");
     let unwell = missing("CAUSTIQUE_OIDN", "doctor");
     let indent = " ".repeat(18);
     let text = format!(
@@ -496,6 +496,8 @@ fn missing_libraries_are_named_before_rendering() {
     assert!(unwell.stdout.contains(&text), "{}", unwell.stdout);
     let without = missing("CAUSTIQUE_USD_PYTHON", "doctor --json");
     assert_eq!((without.code, &without.json()["usd"]["found"]), (Some(0), &serde_json::json!(false)));
+    let without = missing("CAUSTIQUE_BLENDER", "doctor --json").json();
+    assert!(without["blender"]["hint"].as_str().is_some_and(|hint| hint.contains("scripts/setup.sh bpy")), "{without}");
 }
 
 /// Methods that gather photons only on surfaces, or only photons of caustics, would miss light scattered in media. They

@@ -13,7 +13,9 @@ radiant intensity in W/sr, irradiance in W/m2. Anything in a scene that is ignor
 anything invalid raises an Error, which says what to do.
 """
 
+import importlib.util
 import os
+import sys
 from collections.abc import Sequence
 
 from . import _native
@@ -59,6 +61,11 @@ __all__ = [
     "read",
 ]
 
+# This Python reads files of Blender if it has the module. In Blender itself, `bpy` belongs to the running program.
+_bpy = importlib.util.find_spec("bpy") if "bpy" not in sys.modules else sys.modules["bpy"].__spec__
+if _bpy is not None and str(_bpy.origin).endswith(".so"):
+    os.environ.setdefault("CAUSTIQUE_BLENDER", sys.executable)
+
 # The former name of `finish`.
 combine = finish
 
@@ -66,7 +73,7 @@ combine = finish
 class Scene(_native.Scene):
     """A scene that has been read and built. It can be rendered repeatedly, also from several threads at the same time.
 
-    `source` is the path of a .glb or .gltf file, or the bytes of a .glb. Options:
+    `source` is the path of a .glb, .gltf or .blend file or of a stage of USD, or the bytes of a .glb. Options:
 
     environment            environment light instead of the scene's own: a path of an .exr or .hdr, a radiance
                            (r, g, b), or an array (H, W, 3) of radiance in latitude and longitude, the top row first

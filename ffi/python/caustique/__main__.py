@@ -17,8 +17,6 @@ def main():
         PROGRAM.chmod(0o755)
     if importlib.util.find_spec("pxr") is not None:  # This Python reads USD stages.
         os.environ.setdefault("CAUSTIQUE_USD_PYTHON", sys.executable)
-    if importlib.util.find_spec("bpy") is not None:  # This Python reads files of Blender.
-        os.environ.setdefault("CAUSTIQUE_BLENDER", sys.executable)
     os.execv(PROGRAM, ["caustique", *sys.argv[1:]])
 
 

@@ -66,10 +66,10 @@ def options(path):
 
 
 def missing_libraries(path):
-    """A Fault for each library that the program cannot load; the add-on does not need USD."""
+    """A Fault for each library that the program cannot load; the add-on needs neither USD nor another Blender."""
     said = json.loads(_ask(path, "doctor", "--json").stdout)
     return [Fault(f"{name}: {found['cause']}", found.get("hint") or "") for name, found in said.items()
-            if name != "usd" and isinstance(found, dict) and not found["found"]]
+            if name not in {"usd", "blender"} and isinstance(found, dict) and not found["found"]]
 
 
 def clear_cache():

@@ -4,13 +4,16 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::installed;
 use crate::system;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 /// Environment variable with the path of a Blender, or of a Python that has `bpy`.
 pub const VARIABLE: &str = "CAUSTIQUE_BLENDER";
 
 /// The virtual environment with `bpy` that `scripts/setup.sh bpy` installs, in the project's folder.
 const ENVIRONMENT: &str = ".venv-bpy";
+
+/// Python code that prints the version of `bpy`. Blender as a module may hang while it shuts down.
+const PROBE: &str = "import os, bpy; print('Blender', bpy.app.version_string, flush=True); os._exit(0)";
 
 /// Hint that ends errors about a missing Blender.
 pub(super) const HINT: &str = "install Blender 4.2 or newer, so that 'blender' is on the PATH, or run 'scripts/setup.sh \
@@ -57,11 +60,34 @@ impl Blender {
         installed::origin(VARIABLE, ENVIRONMENT, &self.path)
     }
 
+    /// The version of Blender.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Library`]: the program does not run, or is a Python without `bpy`.
+    pub fn version(&self) -> Result<String> {
+        let error = |cause: String| Error::new(ErrorKind::Library, self.path.display(), cause).hint(HINT);
+        let mut command = Command::new(&self.path);
+        match self.is_python() {
+            true => command.args(["-I", "-c", PROBE]),
+            false => command.arg("--version"),
+        };
+        let output = command.stdin(Stdio::null()).output().map_err(|cause| error(cause.to_string()))?;
+        let stdout = String::from_utf8_lossy(&output.stdout);
+        let version = stdout.lines().find_map(|line| line.strip_prefix("Blender "));
+        version.map(|version| version.trim().to_owned()).ok_or_else(|| {
+            let stderr = String::from_utf8_lossy(&output.stderr);
+            error(stderr.lines().last().unwrap_or("it prints no version").trim().to_owned())
+        })
+    }
+
+    fn is_python(&self) -> bool {
+        self.path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("python"))
+    }
+
     /// A command that runs `script` without the user's settings. Blender runs no Python in the files that it opens.
     pub(super) fn command(&self, script: &Path) -> Command {
         let mut command = Command::new(&self.path);
-        let name = self.path.file_name().unwrap_or_default().to_string_lossy();
-        if name.starts_with("python") {
+        if self.is_python() {
             // Isolated, because modules in the current folder may come from an untrusted source.
             command.args(["-I", "-B"]).arg(script);
         } else {
