@@ -98,7 +98,8 @@ def warn_of_clipping(thing, flat, warn):
         plane = f"before its clip start of {camera.clip_start:g} m"
         if not near:
             plane = f"beyond its clip end of {camera.clip_end:g} m"
-        warn(flat.where(thing), f"clipping is not carried: {flat.where(body)} is seen, also {plane}")
+        warn(flat.where(thing), f"clipping is not carried: {flat.where(body)} is seen, also {plane}; hide it in renders if "
+             "that is not meant")
 
 
 def picture(scene, warn):
@@ -108,31 +109,36 @@ def picture(scene, warn):
     share = render.resolution_percentage / 100
     said = {"resolution": [max(round(n * share), 1) for n in (render.resolution_x, render.resolution_y)]}
     if render.pixel_aspect_x != render.pixel_aspect_y:
-        warn(where, "pixels that are not square are not carried")
+        warn(where, "its pixels are rendered as squares: set both pixel aspects to 1")
     if render.use_border:
         left, right, low, high = (getattr(render, f"border_{name}") for name in ("min_x", "max_x", "min_y", "max_y"))
         said["crop"] = [left, 1 - high, right - left, high - low]
     if scene.render.film_transparent:
         said["film_transparent"] = True
         if hasattr(scene, "cycles") and scene.cycles.film_transparent_glass:
-            warn(where, "Transparent Glass of its film is not carried: glass covers the background")
+            warn(where, "Transparent Glass of its film is not carried: glass covers the background; compose over a "
+                        "background that is rendered, too")
     film = getattr(scene.cycles, "film_exposure", 1.0) if hasattr(scene, "cycles") else 1.0
     if film != 1:
-        warn(where, f"its film exposure of {film:g} brightens the PNG alone: the EXR holds radiance as it is")
+        warn(where, f"its film exposure of {film:g} brightens the PNG alone: the EXR holds radiance as it is; multiply it "
+             "when you compose")
     exposure = view.exposure + math.log2(max(film, 1e-6))
     if exposure:
         said["exposure"] = exposure
     if view.view_transform in _TONEMAPS:
         said["tonemap"] = _TONEMAPS[view.view_transform]
     else:
-        warn(where, f'its view transform "{view.view_transform}" is not carried: the PNG is made with agx')
+        warn(where, f'its view transform "{view.view_transform}" is not carried: the PNG is made with agx; open the EXR '
+             "in Blender to see it with this transform")
     look = view.look.removeprefix(f"{view.view_transform} - ")
     if look not in _CONTRASTS or (_CONTRASTS[look] and said.get("tonemap") not in {"agx", "filmic"}):
-        warn(where, f'its look "{view.look}" is not carried: it concerns the PNG alone')
+        warn(where, f'its look "{view.look}" is not carried: it concerns the PNG alone; open the EXR in Blender to see it '
+             "with this look")
     elif _CONTRASTS[look]:
         said["contrast"] = _CONTRASTS[look]
     if view.gamma != 1 or view.use_curve_mapping:
-        warn(where, "gamma and curves of its colour management are not carried: they concern the PNG alone")
+        warn(where, "gamma and curves of its colour management are not carried: they concern the PNG alone; open the EXR "
+             "in Blender to see them")
     # Through decimals, because Blender stores 1.001 in single precision.
     rate = fractions.Fraction(f"{render.fps:.6g}") / fractions.Fraction(f"{render.fps_base:.6g}")
     if rate > 0:
@@ -140,7 +146,8 @@ def picture(scene, warn):
     said["frame"] = scene.frame_current
     _warn_of_limits(scene, where, warn)
     if _has_compositor(scene):
-        warn(where, "its compositor is not carried: the picture is the one before compositing")
+        warn(where, "its compositor is not carried: the picture is the one before compositing; load the EXR by an Image "
+             "node")
     return said
 
 
@@ -153,11 +160,13 @@ def _warn_of_limits(scene, where, warn):
     tight = [f"{name.replace('_', ' ')} {getattr(cycles, name)}" for name, number in usual.items()
              if getattr(cycles, name) < number]
     if tight:
-        warn(where, f"Cycles' limits on light paths are not carried ({', '.join(tight)}): there is more light here")
+        warn(where, f"Cycles' limits on light paths are not carried ({', '.join(tight)}): there is more light here; "
+                    "--max-depth cuts paths, too")
     clamp = [f"{name} {getattr(cycles, 'sample_clamp_' + name):g}" for name, usual in (("direct", 0), ("indirect", 10))
              if 0 < getattr(cycles, "sample_clamp_" + name) != usual]
     if clamp:
-        warn(where, f"Cycles' clamping of bright samples is not carried ({', '.join(clamp)}): there is more light here")
+        warn(where, f"Cycles' clamping of bright samples is not carried ({', '.join(clamp)}): there is more light here, "
+                    "as with clamps of 0 in Cycles")
 
 
 def _has_compositor(scene):

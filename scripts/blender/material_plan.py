@@ -110,7 +110,8 @@ class Plan:
             self.of_object = standin.depends_on_object(self.graph)
             names = [_DISPLAY_NAMES[n] for n in varying if n not in {"direction"}]
             self.say(f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} baked to images of {self.baker.size} x "
-                     f"{self.baker.size} texels")
+                     f"{self.baker.size} texels, which blur finer detail: use image textures there, or a larger "
+                     "--bake-size of export.py")
             for name in _MEANS:
                 if name in varying:
                     self.say(f"{_DISPLAY_NAMES[name]} varies: its mean is taken")

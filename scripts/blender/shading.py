@@ -120,7 +120,8 @@ def finish(entry, material, closed, thickness, warn):
             warn(where, "its volume shader lies behind a film: it is not carried")
         return
     if clear is not None and not closed and "KHR_materials_volume" not in extensions:
-        warn(where, "transmissive, but on a mesh that is not closed: it stays a thin sheet that bends no light")
+        warn(where, "transmissive, but on a mesh that is not closed: it stays a thin sheet that bends no light; close its "
+             "holes (Mesh > Clean Up > Fill Holes), or give it thickness (Solidify)")
     if clear is not None and (closed or "KHR_materials_volume" in extensions):
         volume = extensions.setdefault("KHR_materials_volume", {})
         volume.setdefault("thicknessFactor", thickness)
@@ -140,6 +141,7 @@ def finish(entry, material, closed, thickness, warn):
     if inside is not None and any(inside["sigma_s"]) and closed:
         entry.setdefault("extras", {}).setdefault("caustique", {})["medium"] = inside
     elif inside is not None and (clear is None or not closed):
-        warn(where, "its volume shader needs a closed, transmissive mesh: it is not carried")
+        warn(where, "its volume shader needs a closed, transmissive mesh: it is not carried; close its holes (Mesh > Clean Up "
+                    "> Fill Holes), and let its surface transmit light")
     if not extensions:
         del entry["extensions"]

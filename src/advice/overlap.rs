@@ -38,9 +38,13 @@ pub(super) fn overlapping_solids(scene: &Scene) -> Vec<String> {
         }
     }
     let name = |object: u32| &scene.objects[object as usize];
+    let place = match scene.contents.is_by_blender {
+        true => "Priority in the panel Glass and Water, or the material's custom property \"priority\"",
+        false => "extras.caustique.priority",
+    };
     let warning = |(a, b): (u32, u32)| {
         format!(
-            "objects \"{}\" and \"{}\" overlap, and their materials have the same priority: where they do, the smaller one is taken to fill the space; give one of them the higher priority (extras.caustique.priority)",
+            "objects \"{}\" and \"{}\" overlap, and their materials have the same priority: where they do, the smaller one is taken to fill the space; give one of them the higher priority ({place})",
             name(a),
             name(b)
         )

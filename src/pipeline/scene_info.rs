@@ -20,7 +20,7 @@ pub fn scene_info(path: &Path, scene: &Scene) -> Value {
         let count = lights.get(emitter.name()).and_then(Value::as_u64).unwrap_or(0);
         lights.insert(emitter.name().into(), (count + 1).into());
     }
-    let FileContents { scenes, scene: shown, animations, variants, extensions } = &scene.contents;
+    let FileContents { scenes, scene: shown, animations, variants, extensions, .. } = &scene.contents;
     json!({
         "scene": path.display().to_string(),
         "scenes": scenes,

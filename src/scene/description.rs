@@ -96,6 +96,8 @@ pub struct FileContents {
     pub variants: Vec<String>,
     /// The extensions that it uses, in the order of their names.
     pub extensions: Vec<ExtensionContents>,
+    /// Whether Blender's exporter wrote the file; our own exporter uses it, too.
+    pub is_by_blender: bool,
 }
 
 /// An animation of a glTF file.

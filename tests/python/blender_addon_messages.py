@@ -213,6 +213,19 @@ class Messages(Installed):
         self.render()
         self.assertTrue([line for line in self.said() if "left out, though called for" in line], self.said())
 
+    def test_options_are_called_as_in_the_panels(self):
+        of_interface = part_of_addon("wording").of_interface
+        for line, expected in (
+            ("scene.glb: material \"a\": odd", 'material "a": odd'),
+            ("--method bdpt does not find all light; choose --method sppm or vcm",
+             "the method bdpt does not find all light; choose the Method sppm or vcm in the panel Method"),
+            ("--effects -caustic: left out, though called for by x",
+             "the effect 'caustic' is switched off in the panel Effects: left out, though called for by x"),
+            ("ask for fewer --photons or more --time",
+             "ask for fewer --photons or more Time in the panel Stop (Arguments in the panel Method takes options)"),
+        ):
+            self.assertEqual(of_interface(line), expected)
+
     def test_ignored_settings_of_blender_are_named(self):
         ignored_settings, render = part_of_addon("ignored_settings"), self.scene.render
         self.assertIn("it has no objects that renders show", "".join(ignored_settings.warnings(self.scene)))

@@ -3,7 +3,7 @@
 A render writes a copy of the scene, exports it in a second Blender process (`handoff`), which the frames of an animation
 may share (`persistent_data`), runs the program on the export (`run`), shows the picture so far, and loads the layers as
 passes (`engine`, `passes`). A viewport keeps the program running (`viewport`, `live`, `server`). The program renders; the
-panels show its messages unchanged (`session`, `panels`).
+panels show its messages in words of the interface (`wording`, `session`, `panels`).
 """
 
 from . import (

@@ -26,6 +26,7 @@ def export(job):
     scene.render.engine = "CYCLES"  # this Blender lacks the add-on, and the exporter reads the scene as Cycles would
     scene.render.use_border = False  # the add-on crops the picture itself
     scene.render.use_compositing = False  # the first Blender composes the picture
+    scene.render.pixel_aspect_x = scene.render.pixel_aspect_y = 1  # the add-on itself warns
     # Makes the dependency graph the active one: only that writes animated values of materials to their data.
     bpy.context.evaluated_depsgraph_get()
     whole = int(job["frame"] // 1)

@@ -183,11 +183,6 @@ def _lies_in(excluded):
     return os.path.realpath(bpy.data.filepath).startswith(os.path.join(os.path.realpath(excluded.path), ""))
 
 
-def without_file(line):
-    """Remove the exported file's name from a message of the program, because the user does not know the file."""
-    return line.replace(f"{GLB}: ", "", 1)
-
-
 def in_main_thread(work, stopped):
     """Call `work` in Blender's main thread, from the thread of a render. Returns its result."""
     if threading.current_thread() is threading.main_thread():

@@ -4,7 +4,7 @@ import json
 import re
 import subprocess
 
-from . import fault, handoff
+from . import fault, wording
 
 _POLL_SECONDS = 0.1  # between two checks for cancellation
 _CAUSTICS = ("caustic", "sds")
@@ -24,12 +24,14 @@ def read(words, folder, stopped):
                 process.communicate()
                 raise fault.Cancelled() from None
     if process.returncode != 0:
-        lines = [handoff.without_file(line) for line in messages.splitlines() if not line.startswith("warning: ")]
+        lines = [wording.of_interface(line) for line in messages.splitlines() if not line.startswith("warning: ")]
         raise fault.fault_from_program(lines, process.returncode)
     try:
-        return json.loads(said)
+        plan = json.loads(said)
     except ValueError as error:
         raise fault.Fault("the program's plan cannot be read", "update the program and the add-on together") from error
+    plan["warnings"] = [wording.of_interface(line) for line in plan["warnings"]]
+    return plan
 
 
 def headline(said):

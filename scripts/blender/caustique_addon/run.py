@@ -6,7 +6,7 @@ import subprocess
 import threading
 import time
 
-from . import fault, handoff
+from . import fault, wording
 
 _POLL_SECONDS = 0.05  # between two looks for the saved state
 _INTERRUPTED = 130  # exit code of a program that was interrupted and has written its picture
@@ -34,7 +34,7 @@ class Run:
                 if line.startswith("{"):
                     self._take(json.loads(line))
                 elif line:
-                    self._rest.append(handoff.without_file(line))
+                    self._rest.append(wording.of_interface(line))
 
     def _take(self, event):
         """Keep what an event of `--progress json` says."""
@@ -42,11 +42,11 @@ class Run:
         if kind == "progress":
             self.progress = event
         elif kind == "warning":
-            self.warnings.append(handoff.without_file(event["message"]))
+            self.warnings.append(wording.of_interface(event["message"]))
         elif kind in ("error", "note"):
-            self._rest.append(handoff.without_file(event["message"]))
+            self._rest.append(wording.of_interface(event["message"]))
             if event.get("hint"):
-                self._rest.append(handoff.without_file(f"hint: {event['hint']}"))
+                self._rest.append(wording.of_interface(f"hint: {event['hint']}"))
 
     @property
     def process_id(self):

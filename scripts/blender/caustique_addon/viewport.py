@@ -15,7 +15,7 @@ from typing import NamedTuple
 import bpy
 import numpy
 
-from . import command, handoff, live, preferences, program, server, session
+from . import command, handoff, live, preferences, program, server, session, wording
 from .fault import Cancelled, Fault, fault_from_error
 
 _TIMER_SECONDS = 0.05
@@ -118,7 +118,7 @@ class Viewport:
             engine.unbind_display_space_shader()
             gpu.state.blend_set("NONE")
         fault = self._live.fault
-        return self._message(), None if fault is None else Fault(*fault)
+        return self._message(), None if fault is None else Fault(*map(wording.of_interface, fault))
 
     def _message(self):
         if self._exporting is not None:

@@ -85,7 +85,8 @@ pub(super) fn contents(document: &Document) -> FileContents {
         is_read: container::is_supported(&name),
         name,
     };
-    FileContents { scenes, scene, animations, variants, extensions: used.into_iter().map(extension).collect() }
+    let extensions = used.into_iter().map(extension).collect();
+    FileContents { scenes, scene, animations, variants, extensions, is_by_blender: document.is_by_blender() }
 }
 
 /// Times of the first and the last key of an animation (seconds), as its accessors state them.
