@@ -26,7 +26,7 @@ use pilot::Pilot;
 
 /// Share of the time limit of a render after which the pilot ends. The clock matters on slow or busy machines only:
 /// otherwise counted work ends the pilot earlier.
-const MAX_PILOT_TIME_SHARE: f64 = 0.1;
+pub const MAX_PILOT_TIME_SHARE: f64 = 0.1;
 
 /// The candidate (method and settings) that `auto` has chosen, and why.
 pub struct Choice {
@@ -38,6 +38,8 @@ pub struct Choice {
     pub pilots: Vec<PilotResult>,
     /// Light, error and cost of each effect of the scene; empty if the render is too short to measure them.
     pub weights: Vec<EffectWeight>,
+    /// Shortest time limit, in seconds, of a render that is long enough to measure light effects.
+    pub seconds_to_measure: f64,
     /// Why no pilot was rendered; `None` if some were.
     pub reason: Option<&'static str>,
     /// Core-seconds of an iteration of the render, predicted from counted vertices.
@@ -84,7 +86,8 @@ fn choose_untimed(view: View<'_>, settings_of: &impl Fn(Candidate) -> Option<Set
         effects.into_iter().map(|effect| effect.weight_for(cost, candidate, &settings, pilot.pixels)).collect();
     let predicted = |chosen: &PilotResult| chosen.seconds_per_iteration;
     let seconds_per_iteration = chosen.map_or_else(|| cost.film_seconds(candidate, &settings, view.camera), predicted);
-    Some(Choice { settings, candidate, pilots, weights, reason, seconds_per_iteration, spent: TimeSpent::default() })
+    let (seconds_to_measure, spent) = (pilot.seconds_to_measure(), TimeSpent::default());
+    Some(Choice { settings, candidate, pilots, weights, seconds_to_measure, reason, seconds_per_iteration, spent })
 }
 
 /// The candidate that is taken where no pilot is rendered: the first one whose iteration is not too long, or the one with

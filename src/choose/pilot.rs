@@ -166,13 +166,25 @@ impl<'a> Pilot<'a> {
         CHEAPER.into_iter().map(|counts| Candidate::with_counts(counts, false)).filter(finds_all)
     }
 
+    /// Shortest time limit of a render whose pilot measures light effects, in seconds.
+    pub fn seconds_to_measure(&self) -> f64 {
+        let least = weights::MAX_LIGHT_PICTURES as f64 * self.effects_picture_seconds();
+        least / (EFFECTS_WORK_SHARE * PILOT_WORK_SHARE * ASSUMED_CORES)
+    }
+
+    /// Core-seconds of one of the pictures that measure the effects of the scene.
+    fn effects_picture_seconds(&self) -> f64 {
+        let settings = weights::settings(self.gathering, EFFECTS_PHOTON_SHARE);
+        let pixels = EFFECTS_PIXELS.min(self.pixels);
+        self.cost.iteration_seconds(Candidate::GATHERING, &settings, pixels) * weights::ITERATIONS as f64
+    }
+
     /// Measures what each effect of the scene adds to the picture. Also returns the predicted core-seconds of the
     /// measurement. If the render is too short for all of it, measures light effects only, or nothing.
     pub fn weigh_effects(&self) -> (Vec<WeighedEffect>, f64) {
         let settings = weights::settings(self.gathering, EFFECTS_PHOTON_SHARE);
         let pixels = EFFECTS_PIXELS.min(self.pixels);
-        let picture_seconds =
-            self.cost.iteration_seconds(Candidate::GATHERING, &settings, pixels) * weights::ITERATIONS as f64;
+        let picture_seconds = self.effects_picture_seconds();
         let allowed = EFFECTS_WORK_SHARE * PILOT_WORK_SHARE * self.budget;
         let mut seconds = weights::MAX_LIGHT_PICTURES as f64 * picture_seconds;
         if seconds > allowed {

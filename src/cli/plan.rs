@@ -4,6 +4,7 @@ use super::progress::{Form, duration, percent};
 use super::warnings::lines;
 use super::{print, print_json, printable, scene};
 use caustique::argument::threads;
+use caustique::choose::MAX_PILOT_TIME_SHARE;
 use caustique::error::Result;
 use caustique::options::{RenderOptions, SceneOptions};
 use caustique::pipeline::plan::{PlannedPicture, plan_picture};
@@ -67,7 +68,7 @@ fn report(args: &PlanArgs) -> Result<()> {
             text += &sentence(error, forecast, &planned);
         }
         if auto && plan.effects.iter().all(|effect| effect.energy.is_none()) {
-            text += "nothing is measured: a pilot needs a longer render (--time, --iterations) or a larger picture\n";
+            text += &advise_measurement(options, &planned);
         }
         print(&text)?
     }
@@ -107,6 +108,20 @@ fn sentence(error: f64, forecast: Option<Forecast>, planned: &PlannedPicture) ->
         percent(error),
         duration(seconds),
         percent(reached),
+    )
+}
+
+/// How to get the figures that a plan of a short render lacks, and how long that takes.
+fn advise_measurement(options: &RenderOptions, planned: &PlannedPicture) -> String {
+    let Some(choice) = &planned.chosen.choice else {
+        return "nothing is measured: the options leave one method (leave out those about the method)\n".into();
+    };
+    // A margin, because costs are predicted; a pilot that has run out of its time needs a longer limit than the given one.
+    let least = (1.2 * choice.seconds_to_measure).max(2.0 * options.settings.time.unwrap_or(0.0)).ceil();
+    let without = if options.settings.iterations.is_some() { " and without --iterations" } else { "" };
+    format!(
+        "nothing is measured, because the render is too short: plan with --time {least}{without}, which takes about {}\n",
+        duration(MAX_PILOT_TIME_SHARE * least)
     )
 }
 

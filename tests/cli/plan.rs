@@ -30,6 +30,18 @@ warning: --effects +alpha: nothing in the scene calls for it
     assert_eq!(folder.files(), [""; 0]);
 }
 
+/// The plan of a short render says with which time limit its figures are measured, and with that limit they are.
+#[test]
+fn a_plan_without_figures_says_how_to_get_them() {
+    let folder = Folder::new();
+    let short = folder.run("plan scene.glb --width 64 --iterations 1").stdout;
+    let advice = short.split_once("plan with --time ").map(|(_, rest)| rest).expect(&short);
+    let (seconds, rest) = advice.split_once(' ').expect(advice);
+    assert!(rest.starts_with("and without --iterations, which takes about "), "{advice}");
+    let long = folder.run(&format!("plan scene.glb --width 64 --time {seconds}")).stdout;
+    assert!(long.contains("of the light") && !long.contains("nothing is measured"), "{long}");
+}
+
 /// The JSON has the documented keys, and the effects in order. An effect that is switched off is present, but not
 /// simulated.
 #[test]
