@@ -1,10 +1,11 @@
-//! Options from the render settings of a USD stage, which apply unless the command line gives them.
+//! Options that the kind of scene file sets unless the command line gives them: the render settings of a USD stage, and
+//! layers for compositing from a file of Blender.
 
 use super::{Cli, Command, usage};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::options::{SceneOptions, path_of_frame};
 use caustique::scene::folder::Folder;
-use caustique::scene::usd;
+use caustique::scene::{blend, usd};
 use clap::FromArgMatches;
 use std::ffi::OsString;
 use std::path::Path;
@@ -12,7 +13,7 @@ use std::path::Path;
 /// Prefix of the argument that names the output of a USD RenderProduct; nothing follows if the product has no name.
 const OUTPUT_PREFIX: &str = "--output=";
 
-/// Parses the command line, `words`, again with the options of its USD stage in front, so that those of the command line take
+/// Parses the command line, `words`, again with the options of its scene file in front, so that those of the command line take
 /// precedence. `plan` takes only the options that it has.
 ///
 /// # Errors
@@ -24,17 +25,20 @@ pub fn add_stage_options(command: Command, mut words: Vec<OsString>, line: &mut 
         _ => return Ok(command),
     };
     let path = first_file(scene);
-    if !usd::is_stage(&path.path) || !path.path.is_file() {
-        return Ok(command);
-    }
+    let is_stage = usd::is_stage(&path.path) && path.path.is_file();
+    let options = match is_stage {
+        true => usd::arguments(&path.path, path.allow_outside)?,
+        // Artists composite, and seldom need the layers of the estimate.
+        false if blend::is_blend(&path.path) => vec!["--layers=comp".into()],
+        false => return Ok(command),
+    };
     let named = |word: &String| word.starts_with(OUTPUT_PREFIX);
-    let (products, mut said): (Vec<String>, Vec<String>) =
-        usd::arguments(&path.path, path.allow_outside)?.into_iter().partition(named);
+    let (products, mut said): (Vec<String>, Vec<String>) = options.into_iter().partition(named);
     said.retain(|word| {
         let name = word.trim_start_matches("--").split('=').next();
         known.is_none_or(|known| known.get_arguments().any(|argument| has_name(argument, name)))
     });
-    if matches!(&command, Command::Render(args) if !args.has_output()) {
+    if is_stage && matches!(&command, Command::Render(args) if !args.has_output()) {
         let product = output(&path, products)?;
         product.iter().try_for_each(|word| check_output(scene, word.trim_start_matches(OUTPUT_PREFIX).as_ref()))?;
         said.extend(product);

@@ -2,14 +2,21 @@
 //! the page for compositors read it; `output.rs` computes the values.
 
 use crate::transport::LobeLayer;
+use std::borrow::Cow;
 use std::fmt;
 
 /// Prefix of the name of a layer with the light of one light group.
 pub const LIGHT_GROUP: &str = "LightGroup_";
 /// Prefix of the name of a layer with the caustics of one light group.
 pub const CAUSTIC: &str = "Caustic_";
-/// Prefix of the name of a finished part, a denoised additive part of the picture.
+/// Prefix of the name of a finished part, a denoised additive part of the picture: the layers of this prefix sum to the
+/// picture. Layers by the lobe of the first hit and those of light groups divide the picture anew, so they have prefixes
+/// of their own.
 pub const COMBINED: &str = "Combined";
+/// Prefix of the name of a finished layer of light by the lobe of the first hit.
+const LOBE: &str = "Lobe";
+/// Prefix of the name of a finished layer of a light group.
+const GROUP: &str = "Finished";
 
 /// Prefixes of the names of the cryptomatte layers of objects and of materials.
 pub const CRYPTOMATTES: [&str; 2] = ["CryptoObject", "CryptoMaterial"];
@@ -98,7 +105,7 @@ pub struct LayerKind {
     pub merge: Merge,
     /// Purpose for which the finish reads the layer; `None` if it does not.
     pub finish: Option<Use>,
-    /// Whether `--layers comp` includes the layer; finished parts are always included.
+    /// Whether `--layers comp` includes the layer, besides the finished parts that every render has.
     pub compositing: bool,
     /// Whether half floats suffice for the layer unless a value is too large.
     pub half: bool,
@@ -180,7 +187,17 @@ impl LayerKind {
 
     /// Name of the layer of the finished part, without the suffix; `None` if the kind is not an additive part.
     pub fn finished(&self) -> Option<String> {
-        matches!(self.finish, Some(Use::Part(_))).then(|| format!("{COMBINED}{}", self.name))
+        Some(format!("{}{}", self.finished_prefix()?, self.name))
+    }
+
+    /// Prefix of the name of the finished part; `None` if the kind is not an additive part.
+    pub fn finished_prefix(&self) -> Option<&'static str> {
+        match (self.finish, self.suffix, self.on_request) {
+            (Some(Use::Part(_)), Suffix::Group, _) => Some(GROUP),
+            (Some(Use::Part(_)), _, true) => Some(LOBE),
+            (Some(Use::Part(_)), _, false) => Some(COMBINED),
+            _ => None,
+        }
     }
 
     /// Whether a layer of this kind has the name `name`; a numbered name may lack its number.
@@ -310,6 +327,7 @@ pub static LAYERS: &[LayerKind] = &[
         name: "Error",
         meaning: "estimated error of the beauty: the truth lies within twice as much in nine pixels of ten",
         merge: Merge::Error,
+        compositing: true,
         switch: Some("error"),
         ..LayerKind::COLOUR
     },
@@ -318,7 +336,6 @@ pub static LAYERS: &[LayerKind] = &[
         unit: "1",
         meaning: "reflectance at the first broad hit, through glass and in mirrors of a roughness up to 0.45",
         finish: Some(Use::Picture),
-        compositing: true,
         half: true,
         blender: Some("Denoising Albedo"),
         switch: Some("albedo"),
@@ -330,7 +347,6 @@ pub static LAYERS: &[LayerKind] = &[
         unit: "1",
         meaning: "unit normal at that hit, world axes",
         finish: Some(Use::Picture),
-        compositing: true,
         half: true,
         blender: Some("Normal"),
         switch: Some("use_pass_normal"),
@@ -413,11 +429,29 @@ pub(super) fn stem(name: &str) -> &str {
 }
 
 /// The kind of a layer by its plain name, and whether the name belongs to a finished part; `None` for an unknown name.
-/// A number may be missing: `Level` is the kind of all levels.
+/// A number may be missing: `Level` is the kind of all levels. Accepts former names, see [`current_name`].
 pub fn kind_of(name: &str) -> Option<(&'static LayerKind, bool)> {
     let is = |name: &str| LAYERS.iter().find(|kind| kind.is(name));
-    let finished = name.strip_prefix(COMBINED).and_then(is).filter(|kind| kind.finished().is_some());
-    finished.map(|kind| (kind, true)).or_else(|| Some((is(name)?, false)))
+    let finished = |prefix: &str| {
+        let kind = name.strip_prefix(prefix).and_then(is)?;
+        kind.finished_prefix().filter(|own| *own == prefix || prefix == COMBINED).map(|_| (kind, true))
+    };
+    [COMBINED, LOBE, GROUP].into_iter().find_map(finished).or_else(|| Some((is(name)?, false)))
+}
+
+/// The name of a layer that may have its former name: the names of all finished parts began with `Combined`.
+pub fn current_name(name: &str) -> Cow<'_, str> {
+    match (kind_of(name), name.strip_prefix(COMBINED)) {
+        (Some((kind, true)), Some(part)) => format!("{}{part}", kind.finished_prefix().unwrap_or(COMBINED)).into(),
+        _ => name.into(),
+    }
+}
+
+/// The former name of a layer, if it had another one.
+pub fn former_name(name: &str) -> Option<String> {
+    let (kind, finished) = kind_of(name)?;
+    let prefix = kind.finished_prefix().filter(|prefix| finished && *prefix != COMBINED)?;
+    name.strip_prefix(prefix).map(|part| format!("{COMBINED}{part}"))
 }
 
 /// Names of the layers with additive parts of the picture that every render has, in the order in which they are finished.
@@ -436,7 +470,7 @@ pub fn lobe_names() -> impl Iterator<Item = &'static str> {
 /// Name of the finished part of the layer `name`; `None` if the layer is not an additive part.
 pub fn finished_part(name: &str) -> Option<String> {
     match kind_of(name)? {
-        (LayerKind { finish: Some(Use::Part(_)), .. }, false) => Some(format!("{COMBINED}{name}")),
+        (kind, false) => Some(format!("{}{name}", kind.finished_prefix()?)),
         _ => None,
     }
 }
@@ -485,13 +519,26 @@ mod tests {
         let known = |name: &str| kind_of(name).map(|(kind, finished)| (kind.name, finished));
         assert_eq!(known("Level3"), Some(("Level", false)));
         assert_eq!(known("CombinedCaustic"), Some(("Caustic", true)));
-        assert_eq!(known("CombinedCaustic_key2"), Some((CAUSTIC, true)));
+        for name in ["FinishedCaustic_key2", "CombinedCaustic_key2"] {
+            assert_eq!((known(name), &*current_name(name)), (Some((CAUSTIC, true)), "FinishedCaustic_key2"));
+        }
+        for (current, former) in [
+            ("LobeDiffuseDirect", Some("CombinedDiffuseDirect")),
+            ("FinishedLightGroup_key", Some("CombinedLightGroup_key")),
+            ("CombinedDirect", None),
+            ("DiffuseDirect", None),
+        ] {
+            assert_eq!(former_name(current).as_deref(), former);
+            assert_eq!(current_name(former.unwrap_or(current)), current);
+        }
         assert_eq!(known("CryptoObject00"), Some((CRYPTOMATTES[0], false)));
-        for name in ["Combined", "CombinedNoisy", "Combined1", "3", "albedo2", "Diffuse"] {
+        for name in
+            ["Combined", "CombinedNoisy", "Combined1", "LobeDirect", "FinishedDirect", "3", "albedo2", "Diffuse"]
+        {
             assert_eq!(known(name), None, "{name}");
         }
         assert_eq!(part_names().collect::<Vec<_>>(), ["Emission", "Volume", "Caustic", "Direct", "Indirect"]);
-        assert_eq!(finished_part("LightGroup_key"), Some("CombinedLightGroup_key".into()));
+        assert_eq!(finished_part("LightGroup_key"), Some("FinishedLightGroup_key".into()));
         assert_eq!((finished_part("CombinedDirect"), finished_part("Noisy")), (None, None));
     }
 }

@@ -5,7 +5,7 @@
 //! stop at 31 characters. So our names are `Layer.C` with `[A-Za-z][A-Za-z0-9_]*` for the layer, one letter for the
 //! component, and at most 31 characters.
 
-use super::kind::{CAUSTIC, LAYERS, LIGHT_GROUP, kind_of};
+use super::kind::{CAUSTIC, LAYERS, LIGHT_GROUP, current_name, kind_of};
 use super::layers::{Layer, LayerSet, Plane};
 use crate::error::{Error, ErrorKind, Result};
 use serde::{Deserialize, Serialize};
@@ -88,7 +88,7 @@ pub fn take_plain_names(set: &mut LayerSet) -> Vec<String> {
             layer.name = plain.into();
             to_our_axes(layer);
         } else {
-            layer.name = plain_name(&layer.name).into();
+            layer.name = current_name(plain_name(&layer.name)).into_owned();
         }
     }
     let fits = |layer: &Layer| {

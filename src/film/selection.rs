@@ -1,7 +1,8 @@
 //! The layers that `--layers` selects.
 
 use super::kind::{
-    LAYERS, LOBE_COLORS, LayerKind, MOTION, Suffix, Use, describe, finished_part, kind_of, lobe_names, part_names, stem,
+    LAYERS, LOBE_COLORS, LayerKind, MOTION, Suffix, Use, current_name, describe, finished_part, kind_of, lobe_names,
+    part_names, stem,
 };
 use super::layers::{Layer, LayerSet, Sample};
 use crate::error::{Error, ErrorKind, Result};
@@ -14,7 +15,7 @@ pub enum Selection {
     All,
     /// The beauty alone.
     Beauty,
-    /// Layers for compositing: beauty, finished parts, albedo, normal, depth and cryptomattes, as half floats where these
+    /// Layers for compositing: beauty, its finished parts, depth, cryptomattes and the error, as half floats where these
     /// suffice.
     Comp,
     /// Layers by name; `beauty` is the beauty, `Level` selects `Level1`, `Level2`, ..., and `all` and `comp` select what
@@ -36,7 +37,8 @@ impl Selection {
             "comp" => return Ok(Selection::Comp),
             _ => {}
         }
-        let names: Vec<String> = text.split(',').map(|s| s.trim().to_owned()).filter(|s| !s.is_empty()).collect();
+        let names: Vec<String> =
+            text.split(',').map(|s| current_name(s.trim()).into_owned()).filter(|s| !s.is_empty()).collect();
         if names.is_empty() {
             return Err(Error::new(ErrorKind::Usage, "--layers", "no layer is named")
                 .hint("give all, comp, beauty, or names such as beauty,Noisy,albedo"));
@@ -57,7 +59,10 @@ impl Selection {
         match self {
             Selection::All => !kind_of(name).is_some_and(|(kind, _)| kind.on_request),
             Selection::Beauty => name.is_empty(),
-            Selection::Comp => kind_of(name).is_some_and(|(kind, finished)| finished || kind.compositing),
+            Selection::Comp => {
+                let is_part = |name: &str| part_names().filter_map(finished_part).any(|part| part == name);
+                is_part(name) || kind_of(name).is_some_and(|(kind, finished)| !finished && kind.compositing)
+            }
             Selection::List(names) => names.iter().any(|n| match n.as_str() {
                 "all" => Selection::All.wants(name),
                 "comp" => Selection::Comp.wants(name),

@@ -150,7 +150,7 @@ impl Prepared {
 
 /// The colour of the lobe that a layer, finished or not, has the light of.
 fn color_of<'c>(layer: &str, colors: &'c [Named]) -> Option<&'c Picture> {
-    let part = layer.trim_start_matches("Combined");
+    let part = kind_of(layer).map_or(layer, |(kind, _)| kind.name);
     let of_lobe = |color: &str| color.strip_suffix("Color").is_some_and(|lobe| part.starts_with(lobe));
     colors.iter().find(|(color, _)| of_lobe(color)).map(|(_, picture)| picture)
 }
@@ -487,7 +487,7 @@ impl Finish {
         for (name, mean) in parts {
             of_part.mean = mean;
             // Directly visible lights are noisy at their edges only.
-            let denoised = if of_part.mean.is_black() || ["CombinedEmission", "CombinedEmit"].contains(&&*name) {
+            let denoised = if of_part.mean.is_black() || ["CombinedEmission", "LobeEmit"].contains(&&*name) {
                 of_part.mean.clone()
             } else {
                 // Parts are looked at less closely than the picture.

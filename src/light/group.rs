@@ -3,7 +3,7 @@
 /// Maximum number of light groups in a scene. A light group is a named set of lights whose light gets a layer of its
 /// own, which takes memory in every pixel.
 pub const MAX_GROUPS: usize = 64;
-/// Maximum length of a light group's name in letters. `ViewLayer.CombinedLightGroup_NAME.R` then has 63 letters,
+/// Maximum length of a light group's name in letters. `ViewLayer.FinishedLightGroup_NAME.R` then has 63 letters,
 /// Blender's limit for a channel name.
 pub const MAX_GROUP_NAME: usize = 32;
 

@@ -15,8 +15,9 @@ use std::path::{Path, PathBuf};
 pub struct RunOptions {
     /// Layers of the EXR: 'all', 'comp' for compositing, 'beauty', or names separated by commas
     ///
-    /// 'comp' has the picture, its parts, albedo, normal, depth and cryptomattes, in half floats if these suffice. 'lobes'
-    /// in a list stands for diffuse, glossy and transmitted light, direct and indirect, and their colours
+    /// 'comp' has the picture, its finished parts, depth, cryptomattes and the error, in half floats if these suffice; it is
+    /// the default for files of Blender. 'lobes' in a list stands for diffuse, glossy and transmitted light, direct and
+    /// indirect, and their colours
     #[arg(long, value_name = "all|comp|beauty|LIST", default_value = "all", help_heading = "Output")]
     #[arg(in_stages = true)]
     pub layers: String,

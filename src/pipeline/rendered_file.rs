@@ -1,7 +1,7 @@
 //! Reads the EXR of a render to finish it.
 
 use crate::error::Result;
-use crate::film::{LayerSet, Naming, plain_name, take_plain_names};
+use crate::film::{LayerSet, Naming, current_name, plain_name, take_plain_names};
 use crate::image::exr::{self, Attributes};
 use std::path::Path;
 
@@ -39,7 +39,7 @@ impl RenderedFile {
     /// # Errors
     /// As for [`exr::read`].
     pub fn read_layers(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<RenderedFile> {
-        Ok(RenderedFile::of(path, exr::read_layers(path, |name| wanted(plain_name(name)))?))
+        Ok(RenderedFile::of(path, exr::read_layers(path, |name| wanted(&current_name(plain_name(name))))?))
     }
 
     fn of(path: &Path, (mut set, attributes): (LayerSet, Attributes)) -> RenderedFile {

@@ -444,7 +444,7 @@ fn light_groups_of_any_names_have_layers() {
         let (set, _) = folder.read("out.exr");
         for name in expected {
             let of_naming = if naming == "blender" { "ViewLayer." } else { "" };
-            for prefix in ["LightGroup_", "CombinedLightGroup_"] {
+            for prefix in ["LightGroup_", "FinishedLightGroup_"] {
                 assert!(set.get(&format!("{of_naming}{prefix}{name}")).is_some(), "{name} in {}", outcome.stderr);
             }
         }
@@ -506,10 +506,17 @@ fn layers_can_be_parts_and_half_floats() {
     let names: Vec<String> =
         parts.iter().map(|part| part.own_attributes.layer_name.clone().expect("it has a name").to_string()).collect();
     assert_eq!(names.len(), one.layers.len());
-    assert!(["beauty", "Noisy", "Level1", "Z"].iter().all(|name| names.contains(&(*name).to_string())), "{names:?}");
+    assert_eq!(names[0], "Combined");
+    assert!(["Noisy", "Level1", "Z"].iter().all(|name| names.contains(&(*name).to_string())), "{names:?}");
 
     small(&folder, &format!("{render} --half"));
     let (half, _) = folder.read("out.exr");
+    small(&folder, &format!("{render} --layers comp"));
+    let (comp, _) = folder.read("out.exr");
+    let of_comp =
+        |name: &str| ["", "Z", "Error"].contains(&name) || name.starts_with("Crypto") || (name.starts_with("Combined"));
+    assert!(["Z", "Error", "CombinedCaustic", "CryptoObject00"].iter().all(|name| comp.get(name).is_some()));
+    assert!(comp.layers.iter().all(|layer| of_comp(&layer.name) && !layer.name.contains("Diffuse")));
     let sample = |set: &LayerSet, layer: &str| set.get(layer).expect(layer).planes[0].sample;
     assert_eq!(["", "albedo", "normal"].map(|layer| sample(&half, layer)), [Sample::Half; 3]);
     assert_eq!(["Noisy", "Z", "Variance1"].map(|layer| sample(&half, layer)), [Sample::Float; 3]);

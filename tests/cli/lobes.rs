@@ -26,6 +26,16 @@ fn check_sum(set: &LayerSet, beginning: &str, whole: &str, what: &str) {
     }
 }
 
+/// All layers whose names begin with `Combined` add up to the picture once.
+fn check_prefix(set: &LayerSet, what: &str) {
+    let names = set.layers.iter().map(|layer| &layer.name).filter(|name| name.starts_with("Combined"));
+    let parts: Vec<_> = names.map(|name| values(set, name)).collect();
+    for (index, pixel) in values(set, "").iter().enumerate() {
+        let sum: f32 = parts.iter().map(|part| part[index][1]).sum();
+        assert!((sum - pixel[1]).abs() <= 1e-5 * pixel[1].max(1e-3), "{what}, pixel {index}: {sum} of {pixel:?}");
+    }
+}
+
 /// The layers add up before and after the finish, also if the finish is a command of its own.
 #[test]
 fn layers_add_up_after_the_finish() {
@@ -35,13 +45,14 @@ fn layers_add_up_after_the_finish() {
         run(&folder, &format!("{arguments} --denoise own -o done.exr"));
         let (done, _) = folder.read("done.exr");
         check_sum(&done, "", "Noisy", method);
-        check_sum(&done, "Combined", "", method);
+        check_sum(&done, "Lobe", "", method);
+        check_prefix(&done, method);
         check_black(&done, method);
         run(&folder, &format!("{arguments},Quarter --no-finish -o raw.exr"));
         run(&folder, "finish raw.exr -o later.exr --denoise own");
         let (later, _) = folder.read("later.exr");
-        check_sum(&later, "Combined", "", method);
-        assert!(values(&later, "CombinedGlossyDirect") == values(&done, "CombinedGlossyDirect"), "{method}");
+        check_sum(&later, "Lobe", "", method);
+        assert!(values(&later, "LobeGlossyDirect") == values(&done, "LobeGlossyDirect"), "{method}");
         assert!(done.get("DiffuseColor").is_some() && later.get("TransmissionColor").is_some());
     }
 }
@@ -52,7 +63,7 @@ fn check_black(set: &LayerSet, what: &str) {
     for lobe in ["Diffuse", "Glossy", "Transmission"] {
         let color = values(set, &format!("{lobe}Color"));
         for end in ["Direct", "Indirect"] {
-            let [light, finished] = ["", "Combined"].map(|beginning| values(set, &format!("{beginning}{lobe}{end}")));
+            let [light, finished] = ["", "Lobe"].map(|beginning| values(set, &format!("{beginning}{lobe}{end}")));
             for (index, color) in color.iter().enumerate() {
                 for c in (0..3).filter(|c| color[*c] == 0.0 && light[index][*c] == 0.0) {
                     black += 1;
@@ -73,10 +84,10 @@ fn layers_add_up_after_the_temporal_finish() {
     for frame in 1..=3 {
         run(&folder, &format!("{arguments} --frames {frame} -o alone.#.exr"));
         let set = folder.read(&format!("out.{frame}.exr")).0;
-        check_sum(&set, "Combined", "", &format!("frame {frame}"));
+        check_sum(&set, "Lobe", "", &format!("frame {frame}"));
         check_black(&set, &format!("frame {frame}"));
         let alone = folder.read(&format!("alone.{frame}.exr")).0;
-        assert!(values(&set, "CombinedDiffuseDirect") != values(&alone, "CombinedDiffuseDirect"), "frame {frame}");
+        assert!(values(&set, "LobeDiffuseDirect") != values(&alone, "LobeDiffuseDirect"), "frame {frame}");
     }
 }
 

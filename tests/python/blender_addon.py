@@ -117,12 +117,12 @@ class Renders(Installed):
         self.passes("noisy_parts", "noisy")
         found = self.render()
         for group, lit, dark in (("key", "R", "G"), ("rim_light", "G", "R")):
-            raw, finished = f"LightGroup_{group}", f"CombinedLightGroup_{group}"
+            raw, finished = f"LightGroup_{group}", f"FinishedLightGroup_{group}"
             numpy.testing.assert_allclose(found[f"{raw}.{lit}"], found[f"Noisy.{lit}"], rtol=1e-5)
             numpy.testing.assert_allclose(found[f"{finished}.{lit}"], found[f"Combined.{lit}"], rtol=1e-3)
             for name in (raw, finished):
                 self.assertFalse(found[f"{name}.{dark}"].any(), name)
-            self.assertFalse(found[f"CombinedCaustic_{group}.{lit}"].any())
+            self.assertFalse(found[f"FinishedCaustic_{group}.{lit}"].any())
 
     def test_three_frames_move_as_they_are_animated(self):
         self.plane()

@@ -39,6 +39,13 @@ class LoadsInBlender(support.Scratch):
         for name in [*LAYERS, "Denoising Albedo", "Normal"]:
             self.assertIn(name, names)
 
+    def test_several_parts_are_the_passes_of_one(self):
+        layers = ("--layers", "all")
+        one, parts = passes(self.render(*layers)), passes(self.render(*layers, "--multi-part", "--overwrite"))
+        self.assertEqual(parts[0], "Combined")
+        # Blender gives Z its pass Depth only at the root of a single part.
+        self.assertEqual(set(one) - {"Depth"}, set(parts) - {"Z"})
+
     def test_a_name_that_is_not_there_is_not_found(self):
         self.assertNotIn("Level6", passes(self.render()))
 

@@ -71,6 +71,9 @@ class Blend(support.Scratch):
         frames = [(self.dir / f"out.{n:04}.exr").read_bytes() for n in (1, 2)]
         self.assertNotEqual(*frames)
         self.assertNotIn("lumens", done.stderr)
+        layers = self.run_on("info", self.dir / "out.0001.exr", check=0).stdout
+        self.assertIn("CryptoObject", layers)
+        self.assertNotIn("Level1", layers)
         self.assertEqual(list(self.temporary.iterdir()), [])
 
     def test_warnings_of_the_exporter_are_warnings_of_the_scene(self):
@@ -91,7 +94,8 @@ class Blend(support.Scratch):
         self.save()
         for path in ran:
             path.unlink(missing_ok=True)
-        self.run_on("plan", self.path, "--width", 16, check=0)
+        said = self.run_on("plan", self.path, "--width", 16, check=0).stdout
+        self.assertRegex(said, r'scene "Scene": Python in the file does not run \(Driver .*: use a simple expression')
         self.assertEqual([path for path in ran if path.exists()], [])
         # The file would write these where scripts are allowed.
         bpy.ops.wm.open_mainfile(filepath=str(self.path), use_scripts=True)
@@ -104,6 +108,12 @@ class Blend(support.Scratch):
         done = self.run_on("info", path, check=1)
         self.assertIn("röt.png, which is outside its folder\nhint: ", done.stderr)
         self.run_on("info", path, "--allow-outside", check=0)
+        image = bpy.data.images["red"]
+        image.source, image.filepath = "TILED", str(self.folder / "maps" / "<UDIM>.png")
+        image.name = "tiles"
+        (self.folder / "maps" / "1001.png").write_bytes((self.folder / "maps" / "röt.png").read_bytes())
+        self.save(path)
+        self.assertIn("1001.png, which is outside its folder\n", self.run_on("info", path, check=1).stderr)
 
     def test_faults_say_what_to_do(self):
         self.save()

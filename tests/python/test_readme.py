@@ -107,6 +107,9 @@ class Commands(support.Scratch):
                     self.assertTrue((support.ROOT / EXPORTER).is_file())
                     # A copy of a scene replaces the export.
                     (self.dir / words[-1]).write_bytes(support.scene("blocks").read_bytes())
+                elif any(word.endswith(".blend") for word in words) and COMPOSITOR not in words:
+                    # blender_render.py tests these commands, which need Blender.
+                    self.assertIn(words[1], ("render", "plan", "info"))
                 elif "--with" in words:
                     # Other renderers are not installed where tests run; test_peers.py tests their drivers.
                     self.assertTrue((support.ROOT / "scripts" / "compare" / "setup.sh").is_file())

@@ -5,7 +5,7 @@ use crate::keywords::choice;
 use crate::value::{to_json, to_python};
 use caustique::error::{Error, ErrorKind};
 use caustique::face::write;
-use caustique::film::{Layer, LayerSet, Plane, Sample, describe};
+use caustique::film::{Layer, LayerSet, Plane, Sample, current_name, describe};
 use caustique::image::exr::{self, Attributes};
 use caustique::image::png;
 use caustique::image::tonemap::Look;
@@ -135,7 +135,7 @@ impl Image {
     /// into a copy.
     fn __getitem__<'py>(this: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         let set = &this.get().set;
-        if let Some(layer) = set.get(name) {
+        if let Some(layer) = set.get(&current_name(name)) {
             return match layer.planes.as_slice() {
                 [plane] => view(this, plane),
                 planes => {
@@ -150,7 +150,7 @@ impl Image {
             };
         }
         let (layer, component) = name.rsplit_once('.').unwrap_or(("", name));
-        match set.get(layer).and_then(|layer| layer.plane(component)) {
+        match set.get(&current_name(layer)).and_then(|layer| layer.plane(component)) {
             Some(plane) => view(this, plane),
             None => {
                 let names: Vec<String> = set.layers.iter().map(|layer| format!("'{}'", layer.name)).collect();
@@ -161,7 +161,8 @@ impl Image {
 
     fn __contains__(&self, name: &str) -> bool {
         let (layer, component) = name.rsplit_once('.').unwrap_or(("", name));
-        self.set.get(name).is_some() || self.set.get(layer).is_some_and(|layer| layer.plane(component).is_some())
+        let has_plane = |layer: &Layer| layer.plane(component).is_some();
+        self.set.get(&current_name(name)).is_some() || self.set.get(&current_name(layer)).is_some_and(has_plane)
     }
 
     fn __len__(&self) -> usize {
@@ -289,7 +290,8 @@ fn layer(name: &str, given: &Bound<'_, PyAny>) -> PyResult<((usize, usize), Laye
 pub fn picture(place: &str, given: &Bound<'_, PyAny>, name: Option<&str>) -> PyResult<LayerSet> {
     let name = name.unwrap_or("");
     let chosen = |set: &LayerSet| {
-        let found = if name.is_empty() { set.find(caustique::film::Role::Beauty) } else { set.get(name) };
+        let found =
+            if name.is_empty() { set.find(caustique::film::Role::Beauty) } else { set.get(&current_name(name)) };
         let names = || set.layers.iter().map(|layer| format!("\"{}\"", layer.name)).collect::<Vec<_>>().join(", ");
         let layer =
             found.ok_or_else(|| usage(format!("{place}: no layer \"{name}\""), format!("there are {}", names())))?;

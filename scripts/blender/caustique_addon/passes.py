@@ -13,6 +13,8 @@ import numpy
 Pass = namedtuple("Pass", "name components kind layer switch always")
 
 _COMBINED = "Combined"
+#: Beginnings of the names of finished layers by the lobe of the first hit, and of light groups.
+_LOBE, _GROUP = "Lobe", "Finished"
 #: Characters that layer names cannot contain.
 _NO_LETTER = re.compile("[^0-9A-Za-z]")
 #: The program's table of layers: tests/generated.rs writes the file.
@@ -71,7 +73,7 @@ def wanted(view_layer):
 def _group_passes(view_layer):
     """Passes of each light group: its finished light and caustics, and with Noisy Parts also the noisy estimates."""
     found = dict.fromkeys(_NO_LETTER.sub("_", group.name) for group in getattr(view_layer, "lightgroups", ()))
-    beginnings = [_COMBINED, ""] if view_layer.caustique.noisy_parts else [_COMBINED]
+    beginnings = [_GROUP, ""] if view_layer.caustique.noisy_parts else [_GROUP]
     names = (f"{beginning}{kind}{group}" for group in found for beginning in beginnings for kind in _GROUPS)
     return [Pass(name, "RGB", "COLOR", name, None, False) for name in names]
 
@@ -96,8 +98,8 @@ def fill(render_layer, picture, frame=None):
     for one in render_layer.passes:
         planes = _planes_of_cycles(picture, one.name) or _planes(picture, one.name, one.channel_id)
         if planes is None:
-            plain = one.name.replace(_COMBINED, "", 1)
-            if plain not in _PARTS and not plain.startswith(_GROUPS):
+            part, group = one.name.removeprefix(_COMBINED), one.name.removeprefix(_GROUP)
+            if part not in _PARTS and not group.startswith(_GROUPS):
                 missing.append(one.name)
             continue
         copy_channels(one, planes, picture, frame)
@@ -129,7 +131,7 @@ def _planes_of_cycles(picture, name):
     _, layer, color = _OF_CYCLES.get(name, (None, None, None))
     if layer is None:
         return None
-    planes = _planes(picture, _COMBINED + layer, "RGB") or _planes(picture, layer, "RGB")
+    planes = _planes(picture, _LOBE + layer, "RGB") or _planes(picture, layer, "RGB")
     colors = _planes(picture, color, "RGB") if color and planes else None
     if colors is None:
         # In Blender 5 a noisy part has the name of a pass of Cycles.

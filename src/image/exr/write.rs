@@ -19,9 +19,12 @@ use rayon::prelude::*;
 use super::colour_space::ColourSpace;
 use super::{Attributes, Frame, SOFTWARE, header, zip};
 use crate::error::{Error, ErrorKind, Result};
-use crate::film::{LayerSet, Naming, Plane, Sample, check_names};
+use crate::film::{COMBINED, Layer, LayerSet, Naming, Plane, Sample, check_names, former_name};
 use crate::image::atomic::{self, Draft};
 use serde::Serialize;
+
+/// Text attribute with the former names of layers.
+const ALIASES: &str = "caustiqueAliases";
 
 /// Compression of an EXR. Every method is lossless.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
@@ -110,7 +113,9 @@ fn write_by<T>(
     }
     let header_of = |(index, part): (usize, &Part<'_>)| {
         // Readers look for texts in the first part, but for those of a cryptomatte in the part of each of its layers.
-        let texts = if index == 0 { attributes.texts.clone() } else { matte_texts(part, &attributes.texts) };
+        let mut texts = if index == 0 { attributes.texts.clone() } else { matte_texts(part, &attributes.texts) };
+        texts.remove(ALIASES);
+        texts.extend(aliases(set, options.naming).filter(|_| index == 0).map(|text| (ALIASES.into(), text)));
         header(set, part, &Attributes { texts, ..attributes.clone() }, options)
     };
     let headers: Result<exr::meta::Headers> = parts.iter().enumerate().map(header_of).collect();
@@ -121,16 +126,29 @@ fn write_by<T>(
     })
 }
 
+/// The former names of layers that had others, as the text of a JSON object from each former name to the current one.
+fn aliases(set: &LayerSet, naming: Naming) -> Option<String> {
+    let alias = |layer: &Layer| {
+        let former = former_name(&layer.name)?;
+        Some((naming.layer(&former), naming.layer(&layer.name).into()))
+    };
+    let aliases: serde_json::Map<String, serde_json::Value> = set.layers.iter().filter_map(alias).collect();
+    (!aliases.is_empty()).then(|| serde_json::Value::from(aliases).to_string())
+}
+
 /// The channels of a part of the file, sorted by name.
 struct Part<'a> {
     name: String,
     channels: Vec<(String, Source<'a>)>,
 }
 
-/// One part with all channels, or one part for each layer with planes.
+/// One part with all channels, or one part for each layer with planes, the picture first: many programs show only the first
+/// part.
 fn parts(set: &LayerSet, options: Options) -> Vec<Part<'_>> {
     let mut parts: Vec<Part<'_>> = Vec::new();
-    for layer in set.layers.iter().filter(|layer| !layer.planes.is_empty()) {
+    let (picture, others): (Vec<&Layer>, Vec<&Layer>) =
+        set.layers.iter().filter(|layer| !layer.planes.is_empty()).partition(|layer| layer.name.is_empty());
+    for layer in picture.into_iter().chain(others) {
         let half = options.half && layer.fits_half();
         let channels: Vec<_> = layer
             .planes
@@ -152,10 +170,10 @@ fn parts(set: &LayerSet, options: Options) -> Vec<Part<'_>> {
     parts
 }
 
-/// Name of a layer's part: the name of its channels without the component.
+/// Name of a layer's part: the name of its channels without the component; for the picture, the pass that Blender shows.
 fn part_name(layer: &str, channel: &str) -> String {
     let name = channel.rsplit_once('.').map_or(layer, |(name, _)| name);
-    if name.is_empty() { "beauty".into() } else { name.into() }
+    if name.is_empty() { COMBINED.into() } else { name.into() }
 }
 
 /// The texts about the cryptomatte that a part belongs to: those whose keys share the beginning of the key whose text is
