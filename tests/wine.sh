@@ -79,21 +79,23 @@ for scene in pool gems prism cornell; do
     check "same picture: $scene" python3 -c 'import sys; sys.exit(not float(sys.argv[1]) < 1e-4)' "${difference:-1}"
 done
 check 'network' caustique render "$scenes/pool.glb" -o net.exr --model compact "${small[@]}"
-for i in 1 2; do check "shard $i" caustique render "$scenes/pool.glb" -o "shard$i.exr" --shard "$i/2" "${small[@]}"; done
-check 'merge' caustique merge shard1.exr shard2.exr -o merged.exr
-check 'animation' caustique render "$scenes/pool.glb" -o 'frame####.exr' --frames 1-2 "${small[@]}"
+for i in 0 1; do check "shard $i" caustique render "$scenes/pool.glb" -o "shard$i.exr" --shard "$i/2" "${small[@]}"; done
+check 'merge' caustique merge shard0.exr shard1.exr -o merged.exr
+cp "$ROOT/tests/cli/light/fade_in.gltf" animated.gltf
+animation=(animated.gltf --frames 1-2 --skip-existing)
+check 'animation' caustique render "${animation[@]}" -o 'frame####.exr' "${small[@]}"
 check 'frames' holds frame0001.exr frame0002.exr
 check 'no claims are left' no compgen -G '*.claim'
-# A process that is killed leaves a claim and a checkpoint; the next one takes the frame, and the render.
-wine "$home/bin/caustique.exe" render "$scenes/pool.glb" -o 'long####.exr' --frames 1-1 --width 320 --time 600 \
-    --checkpoint-every 1 --progress none >killed.log 2>&1 &
+# A process that is killed leaves a claim; the next one takes the frame.
+wine "$home/bin/caustique.exe" render "${animation[@]}" -o 'long####.exr' --width 320 --time 600 --progress none \
+    >killed.log 2>&1 &
 for _ in $(seq 120); do [ ! -e long0001.exr.claim ] || break; sleep 0.5; done
 check 'a claim while rendering' holds long0001.exr.claim
 kill -9 $!
 /usr/lib/wine/wineserver64 -k
 wait 2>/dev/null || true
-check 'a frame after a kill' caustique render "$scenes/pool.glb" -o 'long####.exr' --frames 1-1 "${small[@]}"
-check 'its picture' holds long0001.exr
+check 'frames after a kill' caustique render "${animation[@]}" -o 'long####.exr' "${small[@]}"
+check 'their pictures' holds long0001.exr long0002.exr
 check 'its claim is gone' no test -e long0001.exr.claim
 check 'a missing file is an error' no caustique render missing.glb -o missing.exr
 if [ "$(id -u)" -eq 0 ] && mkdir full && mount -t tmpfs -o size=64k caustique-full full 2>/dev/null; then
