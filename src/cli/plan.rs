@@ -10,6 +10,7 @@ use caustique::options::{RenderOptions, SceneOptions};
 use caustique::pipeline::plan::{PlannedPicture, plan_picture};
 use caustique::pipeline::{Forecast, Loaded, forecast};
 use caustique::plan::{EffectPlan, Plan};
+use caustique::render::CONFIDENCE;
 use caustique::scene::View;
 use caustique::stop::Stop;
 use serde_json::json;
@@ -93,9 +94,12 @@ fn forecast_error(args: &PlanArgs, loaded: &Loaded, planned: &PlannedPicture, ta
 /// The forecast as a sentence: `error 2.0 % after about 3 min 20 s (0.11 core-hours, 400 iterations)`, the render that it
 /// assumes, and the pilot that it follows from.
 fn sentence(error: f64, forecast: Option<Forecast>, planned: &PlannedPicture) -> String {
-    let Some(Forecast { iterations, seconds, core_seconds, pilot: (done, reached), .. }) = forecast else {
+    let Some(forecast) = forecast else {
         return format!("error {}: a pilot tells no time after which it is reached\n", percent(error));
     };
+    let Forecast {
+        iterations, iterations_interval: [low, high], seconds, core_seconds, pilot: (done, reached), ..
+    } = forecast;
     let cost = match core_seconds {
         short if short < MIN_CORE_HOURS * 3600.0 => format!("{short:.1} core-seconds"),
         long => format!("{:.2} core-hours", long / 3600.0),
@@ -103,10 +107,12 @@ fn sentence(error: f64, forecast: Option<Forecast>, planned: &PlannedPicture) ->
     let ((width, height), chosen) = (planned.camera.size(), &planned.chosen);
     let method = chosen.candidate.map_or_else(|| chosen.settings.method.name().into(), |candidate| candidate.name());
     format!(
-        "error {} after about {} ({cost}, {iterations} iterations) of a finished render of {width} x {height} pixels by \
-         {method}, without --iterations and --time: a small pilot had {} after {done}\n",
+        "error {} after about {} ({cost}, {iterations} iterations; {} of renders need {low} to {high}) of a \
+         finished render of {width} x {height} pixels by {method}, without --iterations and --time: a \
+         small pilot had {} after {done}\n",
         percent(error),
         duration(seconds),
+        percent(CONFIDENCE),
         percent(reached),
     )
 }

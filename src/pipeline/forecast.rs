@@ -33,6 +33,9 @@ pub struct Forecast {
     pub error: f64,
     /// Number of iterations until the target is reached.
     pub iterations: u64,
+    /// Interval that contains the iterations that a share [`crate::render::CONFIDENCE`] of all renders
+    /// needs.
+    pub iterations_interval: [u64; 2],
     /// Wall-clock seconds until the picture is finished.
     pub seconds: f64,
     /// Core-seconds until the picture is finished.
@@ -149,7 +152,8 @@ impl ForecastPilot<'_, '_> {
     fn forecast(&self) -> Option<Forecast> {
         let done = self.session.iterations();
         let accuracy = Accuracy::fit(self.session.history())?;
-        let iterations = accuracy.iterations_to(self.target)?.max(MIN_ITERATIONS_FOR_ERROR as f64);
+        let least = MIN_ITERATIONS_FOR_ERROR as f64;
+        let (iterations, factor) = (accuracy.iterations_to(self.target)?.max(least), accuracy.iterations_factor());
         let (spent, estimates) = (self.session.spent(), estimates_until(iterations));
         let total = |of: fn(&TimeSpent) -> f64| {
             let iteration = (of(&spent) - of(&self.start)) / done as f64;
@@ -159,6 +163,7 @@ impl ForecastPilot<'_, '_> {
         Some(Forecast {
             error: self.target,
             iterations: iterations.ceil() as u64,
+            iterations_interval: [(iterations / factor).max(least), iterations * factor].map(|n| n.ceil() as u64),
             seconds: total(|time| time.seconds),
             core_seconds: total(|time| time.cpu_seconds),
             pilot: (done, accuracy.error(done)),

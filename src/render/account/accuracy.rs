@@ -136,6 +136,13 @@ impl Accuracy {
         [(noise + bias).sqrt() / factor, (most + (UNSEEN_FACTOR * self.squared_unseen).min(1.0)).sqrt()]
     }
 
+    /// Factor between [`Accuracy::iterations_to`] and the ends of the interval with the iterations that a share
+    /// [`CONFIDENCE`] of all renders needs: the noise that they measure varies as here, and the exponent amplifies that.
+    pub fn iterations_factor(&self) -> f64 {
+        let spread = std::f64::consts::SQRT_2 * MOMENT_SPREAD.hypot(self.measurement_error);
+        (CONFIDENCE_DEVIATIONS * spread / (2.0 * self.exponent)).exp()
+    }
+
     /// Iterations after which the relative error has fallen to `error`; `None` if bias or missing light keep it larger.
     pub fn iterations_to(&self, error: f64) -> Option<f64> {
         let noise = error * error - self.squared_bias - self.squared_unseen;
@@ -216,6 +223,11 @@ mod tests {
         assert!((unsure.error(64) / sure.error(64)).ln().abs() < 0.15, "{}", unsure.error(64) / sure.error(64));
         moments[3].finished = Some(FinishedError { noise: -1e-6, deviation: 1e-6, bias: 0.0, rare: 0.96, unseen: 0.0 });
         let rare = Accuracy::fit(&moments[3..]).expect("one moment");
+        // Squared errors of e^(+-0.2) and, where the noise is as large as the error, e^(+-1), seen twice.
+        let expected = |spread: f64, of: &Accuracy| (1.645 * spread / (2f64.sqrt() * of.exponent)).exp();
+        let factors = [sure, rare].map(|of| of.iterations_factor());
+        assert!((factors[0] / expected(0.2, &sure) - 1.0).abs() < 1e-6, "{factors:?}");
+        assert!((factors[1] / expected(1f64.hypot(0.2), &rare) - 1.0).abs() < 1e-6, "{factors:?}");
         assert!((rare.error(32) - 1e-3).abs() < 1e-9, "{}", rare.error(32));
         let [low, high] = rare.interval(32);
         assert!((high / 1e-3 / (1e-3 / low) - 5.0).abs() < 1e-6, "{low} {high}");
