@@ -40,7 +40,7 @@ pub fn require(bytes: u64, what: impl Display) -> Result<()> {
     match available() {
         Some(Available { bytes: left, source }) if bytes > left => {
             let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
-            let cause = format!("{what} need about {:.1} GiB of memory, {:.1} GiB are {source}", gib(bytes), gib(left));
+            let cause = format!("{what} need about {:.2} GiB of memory, {:.2} GiB are {source}", gib(bytes), gib(left));
             Err(Error::new(ErrorKind::Scene, "", cause))
         }
         _ => Ok(()),
@@ -71,7 +71,7 @@ mod tests {
         assert!(available().expect("a limit").bytes > 0);
         assert!(require(1 << 20, "few").is_ok());
         let error = require(1 << 60, "9 copies").expect_err("no machine has that");
-        assert!(error.cause.starts_with("9 copies need about 1073741824.0 GiB of memory, "), "{error}");
+        assert!(error.cause.starts_with("9 copies need about 1073741824.00 GiB of memory, "), "{error}");
         assert_eq!(reserve::<u64>(3, "numbers").map(|items| items.capacity() >= 3), Ok(true));
         let error = reserve::<u64>(1 << 59, "numbers").expect_err("no machine has that");
         assert_eq!(error.cause, format!("there is no memory for {} numbers ({} MiB)", 1u64 << 59, 1u64 << 42));

@@ -19,9 +19,18 @@ const SCRATCH_PER_PIXEL: u64 = 700;
 /// rounding, so that the limit must not depend on the machine.
 const MAX_MEMORY_MIB: u32 = 1024;
 
-/// Bytes of scratch memory that Open Image Denoise needs for a picture of `pixels` pixels.
-pub fn scratch(pixels: u64) -> u64 {
-    (SCRATCH_PER_PIXEL * pixels).min(u64::from(MAX_MEMORY_MIB) << 20)
+/// Bytes of the weights and buffers of Open Image Denoise.
+const WEIGHTS_BYTES: u64 = 48 << 20;
+/// Bytes per pixel that our own denoiser needs.
+const OWN_PER_PIXEL: u64 = 48;
+
+/// Bytes that a denoiser needs for a picture of `pixels` pixels, and keeps for the next one.
+pub fn held(pixels: u64, choice: DenoiserChoice) -> u64 {
+    match choice {
+        DenoiserChoice::None => 0,
+        DenoiserChoice::Own => OWN_PER_PIXEL * pixels,
+        _ => WEIGHTS_BYTES + (SCRATCH_PER_PIXEL * pixels).min(u64::from(MAX_MEMORY_MIB) << 20),
+    }
 }
 
 /// The user's choice of a denoiser.
@@ -73,6 +82,15 @@ impl Denoiser {
             DenoiserChoice::Auto | DenoiserChoice::Full => {
                 Ok(load_oidn().map_or_else(|error| (Denoiser::Own, Some(error)), |found| (found, None)))
             }
+        }
+    }
+
+    /// The choice that gives this denoiser.
+    pub fn choice(&self) -> DenoiserChoice {
+        match self {
+            Denoiser::Oidn { .. } => DenoiserChoice::Oidn,
+            Denoiser::Own => DenoiserChoice::Own,
+            Denoiser::None => DenoiserChoice::None,
         }
     }
 

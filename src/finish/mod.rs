@@ -24,7 +24,7 @@ pub mod temporal;
 mod window;
 
 pub use bound::Clamped;
-pub use denoiser::{Denoiser, DenoiserChoice, Quality};
+pub use denoiser::{Denoiser, DenoiserChoice, Quality, held};
 pub use estimate::{Estimate, quarters};
 pub use finished_error::{DEFAULT_CONVERGENCE_RATE, ErrorMap, FinishedError};
 pub use window::{Windows, window};
@@ -38,21 +38,27 @@ use crate::film::{
 };
 use crate::memory;
 use crate::stop::Stop;
+use crate::system;
 use bound::Noise;
-use denoiser::scratch;
 use estimate::{alpha, estimate_layers, own_level};
 use finished_error::ErrorEstimator;
 use parts::Part;
 use rayon::prelude::*;
 
-/// Bytes of memory per pixel that a finish without parts needs beside its layers: the estimates by all and by half of
-/// the iterations, their pictures, the quarters, and the buffers of the error estimate.
-pub const BYTES_PER_PIXEL: u64 = 384;
-/// Bytes of memory per pixel that the finish needs for each additive part of the picture.
-pub const BYTES_PER_PIXEL_OF_PART: u64 = 36;
-/// Bytes that a finish takes whatever the size of the picture: the library of the denoiser and its network. A bound
-/// found by lowering `ulimit -v` (`no_limit_of_memory_aborts` in `tests/cli/limits.rs`).
-const LIBRARY_BYTES: u64 = 192 << 20;
+/// Bytes per pixel of a finish without parts, beside its layers and the memory of the denoiser: the estimates by all and
+/// by half of the iterations, their pictures, the quarters, and the buffers of the error estimate.
+const BYTES_PER_PIXEL: u64 = 250;
+/// Bytes per pixel of a finish when it splits the picture into parts: the estimate, the picture and its noise.
+const BYTES_PER_PIXEL_WITH_PARTS: u64 = 120;
+/// Bytes per pixel of each additive part of the picture: its estimate, denoised and finished.
+const BYTES_PER_PIXEL_OF_PART: u64 = 36;
+/// Bytes per pixel of the error that is estimated between iterations.
+const BYTES_PER_PIXEL_OF_ERROR: u64 = 180;
+/// Bytes of the code of the denoiser's library.
+const LIBRARY_BYTES: u64 = 12 << 20;
+/// Address space that the library and its threads reserve and do not use. A bound found by lowering `ulimit -v`
+/// (`no_limit_of_memory_aborts` in `tests/cli/limits.rs`).
+const LIBRARY_ADDRESSES: u64 = 132 << 20;
 /// Name of the layer with the estimated error of every pixel of the finished picture.
 pub const ERROR: &str = "Error";
 
@@ -71,16 +77,27 @@ pub fn reads(name: &str) -> bool {
     reads_for_error(name) || finished_part(name).is_some()
 }
 
-/// Bytes that a finish of a picture of `pixels` pixels takes besides its layers. `parts`: number of its additive parts.
-/// The denoiser works in tiles if memory is short.
-pub fn bytes(pixels: u64, parts: u64) -> u64 {
-    LIBRARY_BYTES + pixels * (BYTES_PER_PIXEL + parts * BYTES_PER_PIXEL_OF_PART) + scratch(pixels)
+/// Bytes that the library of the denoiser takes as long as it is loaded.
+pub fn library_bytes() -> u64 {
+    LIBRARY_BYTES + if system::counts_unused_addresses() { LIBRARY_ADDRESSES } else { 0 }
+}
+
+/// Bytes that a finish of a picture of `pixels` pixels takes besides its layers and the library. `parts`: number of its
+/// additive parts.
+pub fn bytes(pixels: u64, parts: u64, denoiser: DenoiserChoice) -> u64 {
+    let with_parts = BYTES_PER_PIXEL_WITH_PARTS + parts * BYTES_PER_PIXEL_OF_PART;
+    held(pixels, denoiser) + pixels * BYTES_PER_PIXEL.max(with_parts)
+}
+
+/// Bytes that the estimate of a finished picture's error takes between iterations, besides its layers and the library.
+pub fn bytes_for_error(pixels: u64, denoiser: DenoiserChoice) -> u64 {
+    held(pixels, denoiser) + pixels * BYTES_PER_PIXEL_OF_ERROR
 }
 
 /// Checks that there is memory to finish a layer set, as far as its size and its `parts` parts decide.
-fn require_memory(set: &LayerSet, parts: usize) -> Result<()> {
+fn require_memory(set: &LayerSet, parts: usize, denoiser: &Denoiser) -> Result<()> {
     let (width, height) = (set.width, set.height);
-    let needed = bytes(width as u64 * height as u64, parts as u64) - LIBRARY_BYTES;
+    let needed = bytes(width as u64 * height as u64, parts as u64, denoiser.choice());
     let outcome = memory::require(needed, format_args!("finishing {width} x {height} pixels with {parts} parts"));
     outcome.map_err(|error| error.hint("finish the picture where more memory is free, or with fewer --layers"))
 }
@@ -346,7 +363,7 @@ impl Finish {
     /// Layers are missing ([`Estimate::of`]), or the denoiser or the network fails; the set is unchanged then.
     pub fn apply(&mut self, set: &mut LayerSet, wanted: impl Fn(&str) -> bool) -> Result<Finished> {
         let names = parts_to_finish(set, &wanted);
-        require_memory(set, names.len())?;
+        require_memory(set, names.len(), &self.denoiser)?;
         let (estimate, combined) = self.estimate(set)?;
         let denoised = self.denoiser.run(&estimate, self.quality, self.stop.as_ref())?;
         let half = quarters(set).map(|quarters| self.picture(&estimate.first_half(&quarters))).transpose()?;
@@ -364,12 +381,27 @@ impl Finish {
         layers.map(|layer| layer.name.clone()).collect()
     }
 
+    /// Checks that there is memory for `frames` more frames like a set, which may lack its values, and to finish one.
+    ///
+    /// # Errors
+    /// There is not.
+    pub fn check_memory_of_frames(&self, set: &LayerSet, frames: usize) -> Result<()> {
+        let (width, height) = (set.width, set.height);
+        let (pixels, parts) = (width as u64 * height as u64, part_layers(set).count() as u64);
+        let channels = set.layers.iter().map(|layer| layer.planes.len() as u64).sum::<u64>();
+        let held = frames as u64 * pixels * temporal::bytes_per_pixel(parts);
+        // The layers that the finish leaves as they are come last.
+        let needed = held + bytes(pixels, parts, self.denoiser.choice()).max(4 * channels * pixels);
+        let outcome = memory::require(needed, format_args!("{frames} frames of {width} x {height} pixels"));
+        outcome.map_err(|error| error.hint("finish the frames where more memory is free, or with fewer --layers"))
+    }
+
     /// Reads and denoises a frame of an animation for the temporal finish of itself and of its neighbours.
     ///
     /// # Errors
     /// Layers are missing ([`Estimate::of`]), motion vectors too, or the denoiser or the network fails.
     pub fn frame(&mut self, set: LayerSet) -> Result<temporal::Frame> {
-        require_memory(&set, part_layers(&set).count())?;
+        require_memory(&set, part_layers(&set).count(), &self.denoiser)?;
         let (estimate, combined) = self.estimate(&set)?;
         let quarters = quarters(&set);
         let motion = temporal::motion(&set)?;

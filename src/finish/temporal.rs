@@ -61,8 +61,12 @@ pub(super) struct Pictures {
     pub is_denoised: bool,
 }
 
-/// One frame of an animation, as the temporal finish of its neighbours reads it: 112 bytes per pixel, and 12 for each
-/// additive part that is not black.
+/// Most bytes per pixel of a [`Frame`] with `parts` additive parts, of which black ones take no memory.
+pub(super) fn bytes_per_pixel(parts: u64) -> u64 {
+    112 + 12 * parts
+}
+
+/// One frame of an animation, as the temporal finish of its neighbours reads it.
 pub struct Frame {
     pictures: Pictures,
     /// Additive parts of the estimate by name; `None` if a part is black.

@@ -47,7 +47,9 @@ pub(super) fn check(request: &Request, scene: &Scene) -> Result<Checked> {
     layers::check(&request.layers, &shape, finishes, true)?;
     layers::check_names(&request.layers, &shape, finishes, request.naming)?;
     let view = View::new(scene, &checked.camera);
-    let memory = MemoryCheck { view, method: request.picture.settings.method.name(), finishes, limit: request.memory };
+    let (layers, finish) = (&request.layers, request.finish.as_ref().map(|finish| finish.denoiser));
+    let method = request.picture.settings.method.name();
+    let memory = MemoryCheck { view, method, layers, finish, limit: request.memory };
     memory.fit(checked.settings.clone())?;
     Ok(checked)
 }

@@ -72,7 +72,8 @@ pub(super) fn choose_for_render(
     observer: &mut dyn Observer,
 ) -> Result<Chosen> {
     let (layers, finishes) = (&request.layers, request.finish.is_some());
-    let memory = MemoryCheck { view, method: "auto", finishes, limit: request.memory };
+    let finish = request.finish.as_ref().map(|finish| finish.denoiser);
+    let memory = MemoryCheck { view, method: "auto", layers, finish, limit: request.memory };
     let fits = memory.admits();
     let accepts =
         |of: &Settings| fits(of) && layers::check(layers, &layer_shape(of, view.scene), finishes, true).is_ok();

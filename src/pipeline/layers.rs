@@ -7,6 +7,7 @@ use crate::film::output::{self, Shape};
 use crate::film::{
     self, CRYPTOMATTES, Layer, LayerSet, MOTION, Naming, Plane, Sample, Selection, describe, finished_part, part_names,
 };
+use crate::finish::{reads, reads_for_error};
 use crate::image::exr::Attributes;
 use crate::render::Rendered;
 use crate::scene::Scene;
@@ -28,9 +29,33 @@ fn names(shape: &Shape, finished: bool) -> Vec<String> {
     names
 }
 
-/// Number of channels that the EXR of a render of this shape can have.
-pub fn channels(shape: &Shape) -> usize {
-    names(shape, true).iter().filter_map(|name| describe(name)).map(|layer| layer.components.len()).sum()
+/// Numbers of the layers of a picture, from which its memory follows.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct LayerCounts {
+    /// Number of channels of the layers that are written or that the finish reads.
+    pub channels: usize,
+    /// Number of channels of the layers from which the error of the finished picture is estimated.
+    pub channels_of_error: usize,
+    /// Number of additive parts that are finished.
+    pub parts: usize,
+    /// Whether there are motion vectors.
+    pub motion: bool,
+}
+
+impl LayerCounts {
+    /// The layers of a render of this shape that a selection and the finish, if there is one, take.
+    pub fn new(shape: &Shape, selection: &Selection, finishes: bool) -> LayerCounts {
+        let all = names(shape, false);
+        let wanted = |name: &String| selection.wants(name) || name.is_empty() || (finishes && reads(name));
+        let channels = |takes: &dyn Fn(&String) -> bool| {
+            let layers = all.iter().filter(|name| takes(name)).filter_map(|name| describe(name));
+            layers.map(|layer| layer.components.len()).sum()
+        };
+        let finished: Vec<String> = all.iter().filter_map(|name| finished_part(name)).collect();
+        let parts = if finishes && finished.iter().any(|name| selection.wants(name)) { finished.len() } else { 0 };
+        let channels_of_error = channels(&|name| reads_for_error(name));
+        LayerCounts { channels: channels(&wanted), channels_of_error, parts, motion: selection.wants(MOTION) }
+    }
 }
 
 /// Checks that a render of this shape has all layers of a selection. `motion`: whether it has motion vectors.

@@ -12,8 +12,8 @@ use super::load::Loaded;
 use super::memory::{MemoryCheck, MemoryLimit};
 use super::request::PictureRequest;
 use crate::error::{Error, ErrorKind, Result};
-use crate::film::LayerSet;
-use crate::finish::reads_for_picture;
+use crate::film::{LayerSet, Selection};
+use crate::finish::{DenoiserChoice, reads_for_picture};
 use crate::render::{
     Candidate, Control, Progress, RenderInput, Session, Settings, SettingsRequest, StopReason, run_session,
 };
@@ -86,8 +86,9 @@ pub fn render_live(
     }
     let checked = check_picture(&request.picture, request.path, scene)?;
     let view = View::new(scene, &checked.camera);
-    let (name, finishes) = (request.picture.settings.method.name(), finish.is_some());
-    let memory = MemoryCheck { view, method: name, finishes, limit: request.memory };
+    let (method, finish_by) =
+        (request.picture.settings.method.name(), finish.as_ref().map(|_| DenoiserChoice::default()));
+    let memory = MemoryCheck { view, method, layers: &Selection::Beauty, finish: finish_by, limit: request.memory };
     let fit = |settings: Settings| {
         let (settings, _) = memory.fit(settings)?;
         Ok(Settings { stop: request.stop.clone(), target_error: None, ..settings })

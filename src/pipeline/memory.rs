@@ -1,19 +1,18 @@
 //! Estimates the memory of a render before it begins, and refuses a render that does not fit.
 
-use super::layers;
+use super::layers::LayerCounts;
 use crate::error::{Error, Result};
 use crate::estimator::PixelAccumulator;
 use crate::estimator::rule::{adaptive, chi_squared, local};
-use crate::film;
+use crate::film::Selection;
 use crate::film::output::Shape;
-use crate::finish;
+use crate::finish::{self, DenoiserChoice};
 use crate::memory;
-use crate::photon;
 use crate::plan::Search;
 use crate::render::output::layer_shape;
 use crate::render::{
-    BandwidthRule, Counts, MAX_TECHNIQUES, PHOTON_BYTES, Settings, ShardResult, WHOLE_TILE, bytes_per_whole_tile,
-    photons_per_path as mean_photons, sample_bytes,
+    BandwidthRule, Counts, MAX_TECHNIQUES, MIN_ITERATIONS_FOR_ERROR, PHOTON_BYTES, Settings, ShardResult, WHOLE_TILE,
+    bytes_per_whole_tile, photons_per_path as mean_photons, sample_bytes,
 };
 use crate::scene::View;
 use crate::transport::{FirstScatter, MergePhoton, Splat};
@@ -31,17 +30,28 @@ const SPLAT_BYTES: u64 = 2 * size_of::<Splat>() as u64 + 8;
 /// Bytes per pixel of the weighted and the unweighted picture of one sampling technique.
 const BYTES_PER_TECHNIQUE: u64 = 24;
 
-/// Number of channels of the layers that a finish with a network reads.
-const FINISH_CHANNELS: usize = 37;
-
 /// Smallest number of light paths per iteration that a limit on memory may leave.
-const MIN_PHOTONS: u32 = 1000;
+const MIN_PHOTONS: u64 = 1000;
 
 /// Share of the free memory that photons may take if it does not hold all: other programs take memory meanwhile.
 const FREE_SHARE: f64 = 0.75;
 
 /// Mean number of photons per light path above which messages name `--max-depth`. Closed white rooms have thousands.
 const LONG_PATH: f64 = 64.0;
+
+/// Bytes per pixel of the objects that each pixel shows, which name the places of the largest errors.
+const VISIBLE_BYTES: u64 = 72;
+
+/// Bytes of light paths, Markov chains and the numbers of their pixels, per pixel and per vertex of a path of a chain,
+/// which has two more vertices than a light path.
+const CHAIN_BYTES: f64 = 70.0;
+
+/// Bytes per pixel of the freed sums of bandwidth levels, light groups and lobes that a finish uses again. The allocator
+/// keeps the rest, because they are small pieces.
+const REUSED_BYTES: u64 = 150;
+
+/// Memory of photons over that of their map: the allocator keeps the lists in which threads have left them.
+const PHOTON_LISTS: f64 = 1.25;
 
 /// The sizes that the memory of a render depends on, besides its settings.
 #[derive(Clone, Copy)]
@@ -50,31 +60,32 @@ struct Extent {
     film: (u32, u32),
     /// Width and height of the whole picture (pixels).
     whole: (u32, u32),
-    /// Number of channels in all layers of the EXR.
-    channels: usize,
+    /// Layers of the EXR.
+    layers: LayerCounts,
     /// Number of light groups (lights with layers of their own).
     groups: usize,
     /// Whether light is recorded by the lobe of the first hit.
     lobes: bool,
     /// Mean number of photons that a light path stores.
     photons_per_path: f64,
+    /// Number of kinds of photons with bandwidths.
+    kinds: usize,
+    /// The denoiser that the user asks for; `None` without a finish.
+    finish: Option<DenoiserChoice>,
 }
 
 impl Extent {
-    fn new(view: View<'_>, settings: &Settings, channels: usize) -> Extent {
-        let photons_per_path = mean_photons(view.scene, view.camera, settings);
-        Extent::with_photons(view, settings, channels, photons_per_path)
-    }
-
     fn with_photons(
-        View { scene, camera }: View<'_>,
+        view: View<'_>,
         settings: &Settings,
-        channels: usize,
+        (layers, finish): (&Selection, Option<DenoiserChoice>),
         photons_per_path: f64,
     ) -> Extent {
-        let [film, whole] = camera.sizes();
-        let groups = scene.lights.groups().names.len();
-        Extent { film, whole, channels, groups, lobes: settings.lobes, photons_per_path }
+        let [film, whole] = view.camera.sizes();
+        let groups = view.scene.lights.groups().names.len();
+        let layers = LayerCounts::new(&layer_shape(settings, view.scene), layers, finish.is_some());
+        let kinds = settings.bandwidth_kinds(&view.scene.survey).iter().filter(|there| **there).count().max(1);
+        Extent { film, whole, layers, groups, lobes: settings.lobes, photons_per_path, kinds, finish }
     }
 
     /// Words of a hint that name the length of light paths if they are long; empty otherwise.
@@ -86,17 +97,48 @@ impl Extent {
         format!(", or --max-depth {LONG_PATH} for shorter light paths (they have {photons:.0} vertices on average)")
     }
 
-    /// Bytes at the end of a render, when its pixels and its layers exist together.
+    /// Largest number of bytes that the render takes at a time, without the libraries: for an iteration, for the error
+    /// of the finished picture between iterations, for the layers beside the sums, or for the finish.
     fn bytes(&self, settings: &Settings) -> u64 {
         let [across, down] = [self.whole.0, self.whole.1].map(|side| u64::from(side.div_ceil(WHOLE_TILE)));
         let walks_whole_picture = settings.method.walks_whole_picture();
         let tiles = if walks_whole_picture { across * down * bytes_per_whole_tile() } else { 0 };
-        pixels(self.film) * self.bytes_per_pixel(settings) + self.bytes_of_map(settings) + tiles
+        let (pixels, map, lists) = (pixels(self.film), self.bytes_of_map(settings), self.light_lists(settings));
+        let sums =
+            PixelAccumulator::bytes(settings.levels.count, settings.merges_one_level(), self.groups, self.lobes) as u64;
+        // An upper bound: most scenes leave some of the techniques without a picture.
+        let techniques = if settings.techniques { MAX_TECHNIQUES as u64 * BYTES_PER_TECHNIQUE } else { 0 };
+        let [layers, of_error] = [self.layers.channels, self.layers.channels_of_error].map(|n| 4 * n as u64);
+        let motion = if self.layers.motion { 16 } else { 0 };
+        let bandwidths = bytes_of_bandwidths(settings, self.kinds);
+        let between = sums + sample_bytes(settings) as u64 + 2 * bandwidths + techniques + motion + lists;
+        let kept_between = pixels * between + map + tiles;
+        // Measured: an iteration that only merges takes the memory of its light paths twice.
+        let again = if settings.method.search() == Search::Merging { lists } else { 0 };
+        let iterating = kept_between + pixels * again;
+        let kept = pixels * (sums + bandwidths + techniques + motion + layers + lists / 2) + map;
+        let Some(denoiser) = self.finish else { return iterating.max(kept) };
+        let parts = self.layers.parts as u64;
+        let pieces = match settings.is_shard() {
+            true => sums,
+            false => (sums - size_of::<PixelAccumulator>() as u64).saturating_sub(REUSED_BYTES) + lists / 2,
+        };
+        let finishing = pixels * (layers + motion + VISIBLE_BYTES + pieces) + finish::bytes(pixels, parts, denoiser);
+        let estimates = settings.iterations_of_shard().is_none_or(|n| n >= MIN_ITERATIONS_FOR_ERROR);
+        // The denoiser keeps its memory for the next estimate.
+        let (estimating, held) = match estimates {
+            true => (
+                kept_between + pixels * of_error + finish::bytes_for_error(pixels, denoiser),
+                finish::held(pixels, denoiser),
+            ),
+            false => (0, 0),
+        };
+        iterating.max(estimating).max(kept + pixels * VISIBLE_BYTES + held).max(finishing)
     }
 
     /// Bytes of the photon map while it is built.
     fn bytes_of_map(&self, settings: &Settings) -> u64 {
-        let bytes = (f64::from(settings.photons) * self.photons_per_path * PHOTON_BYTES as f64) as u64;
+        let bytes = (f64::from(settings.photons) * self.photons_per_path * PHOTON_LISTS * PHOTON_BYTES as f64) as u64;
         match settings.method {
             method if method.has_one_map() => settings.photon_memory.min(bytes),
             method if method.takes_photon_count() => bytes,
@@ -104,27 +146,20 @@ impl Extent {
         }
     }
 
-    /// Bytes per pixel: sums, bandwidths, layers, and the light paths that methods without a number of photons send for
-    /// each pixel.
-    fn bytes_per_pixel(&self, settings: &Settings) -> u64 {
+    /// Bytes per pixel of the light paths that methods without a number of photons send for each pixel.
+    fn light_lists(&self, settings: &Settings) -> u64 {
         let method = settings.method;
         let light_paths = settings.counts.light_paths_per_pixel() * if settings.levels.two_paths { 2.0 } else { 1.0 };
         let vertices = light_paths * self.photons_per_path;
+        if method.has_chains() {
+            return (CHAIN_BYTES * (2.0 + vertices)) as u64;
+        }
         let merges = method.has_bandwidths() && !method.takes_photon_count() && !method.has_one_map();
         let merged = if merges { (vertices * MERGED_BYTES as f64) as u64 } else { 0 };
         // On average a window receives one light path per pixel, as the whole picture does.
         let connects = method.walks_whole_picture() || method.search() == Search::ConnectionsAndMerging;
         let splat_bytes = SPLAT_BYTES + if self.lobes { 2 * size_of::<FirstScatter>() as u64 } else { 0 };
-        let splats = if connects { (vertices * splat_bytes as f64) as u64 } else { 0 };
-        // An upper bound: most scenes leave some of the techniques without a picture.
-        let techniques = if settings.techniques { MAX_TECHNIQUES as u64 * BYTES_PER_TECHNIQUE } else { 0 };
-        bytes_of_bandwidths(settings)
-            + techniques
-            + (PixelAccumulator::bytes(settings.levels.count, settings.merges_one_level(), self.groups, self.lobes)
-                + sample_bytes(settings)) as u64
-            + (self.channels * size_of::<f32>()) as u64
-            + merged
-            + splats
+        merged + if connects { (vertices * splat_bytes as f64) as u64 } else { 0 }
     }
 }
 
@@ -132,8 +167,8 @@ fn pixels((width, height): (u32, u32)) -> u64 {
     u64::from(width) * u64::from(height)
 }
 
-/// Bytes per pixel for its bandwidths and photon counts.
-fn bytes_of_bandwidths(settings: &Settings) -> u64 {
+/// Bytes per pixel for its bandwidths and photon counts, for a number of `kinds` of photons.
+fn bytes_of_bandwidths(settings: &Settings, kinds: usize) -> u64 {
     let cells = settings.chi_squared.annuli * settings.chi_squared.sectors;
     let state = match settings.bandwidth_rule() {
         Some(BandwidthRule::ChiSquared) => {
@@ -145,28 +180,31 @@ fn bytes_of_bandwidths(settings: &Settings) -> u64 {
         Some(BandwidthRule::Memoryless) | None => 0,
     };
     let channels = if settings.has_channels() { 3 } else { 1 };
-    // An upper bound: a scene may have photons of one kind only. Twice, for iterations that are discarded.
-    2 * (settings.levels.count * channels * photon::Kind::ALL.len() * state) as u64
+    (settings.levels.count * channels * kinds * state) as u64
 }
 
-/// Bytes that a finish takes besides pixels and layers.
-fn finish_bytes(size: (u32, u32), groups: usize, lobes: bool) -> u64 {
-    // The parts by effect and by lobe, and for each light group its part and its caustics.
-    let lobes = if lobes { film::lobe_names().count() } else { 0 };
-    finish::bytes(pixels(size), (film::part_names().count() + lobes + 2 * groups) as u64)
-}
-
-/// Checks that there is memory to merge the shards of a render, and to finish its picture if it `finishes`.
+/// Checks that there is memory to merge the shards of a render, and to finish its picture by `finish`.
 ///
 /// # Errors
 /// There is not.
-pub(super) fn check_merge(part: &ShardResult, shape: &Shape, finishes: bool) -> Result<()> {
-    let (width, height) = part.size;
-    let (groups, levels) = (shape.groups.len(), part.settings.levels.count);
-    let pixel =
-        PixelAccumulator::bytes(levels, shape.merges, groups, shape.lobes) + layers::channels(shape) * size_of::<f32>();
-    let finish = if finishes { finish_bytes(part.size, groups, shape.lobes) } else { 0 };
-    let needed = pixels(part.size) * pixel as u64 + finish;
+pub(super) fn check_merge(
+    part: &ShardResult,
+    shape: &Shape,
+    selection: &Selection,
+    finish: Option<DenoiserChoice>,
+) -> Result<()> {
+    let ((width, height), pixels) = (part.size, pixels(part.size));
+    let layers = LayerCounts::new(shape, selection, finish.is_some());
+    let sums =
+        PixelAccumulator::bytes(part.settings.levels.count, shape.merges, shape.groups.len(), shape.lobes) as u64;
+    let channels = 4 * layers.channels as u64;
+    let pieces = (sums - size_of::<PixelAccumulator>() as u64).saturating_sub(REUSED_BYTES);
+    let joined = pixels * (sums + channels);
+    let needed = finish.map_or(joined, |denoiser| {
+        let finishing =
+            pixels * (channels + VISIBLE_BYTES + pieces) + finish::bytes(pixels, layers.parts as u64, denoiser);
+        finish::library_bytes() + (joined + pixels * VISIBLE_BYTES).max(finishing)
+    });
     let outcome = memory::require(needed, format_args!("the sums and layers of {width} x {height} pixels"));
     outcome.map_err(|error| error.hint("merge where more memory is free, or with --no-finish"))
 }
@@ -190,45 +228,42 @@ impl MemoryLimit {
         Ok((fitted, Some(format!("--memory {}: {less}", self.bytes >> 20))))
     }
 
-    /// Settings with the largest number of photons that fits the limit, and a message with that number.
+    /// Settings with the largest number of light paths or photons that fits the limit, and a message with that number.
     ///
     /// # Errors
     /// The bytes that the render needs at least, which are more than the limit.
     fn shrink(self, extent: Extent, settings: &Settings) -> std::result::Result<(Settings, String), u64> {
-        if settings.method.takes_counts() {
-            return self.shrink_light_paths(extent, settings);
-        }
-        if !settings.method.takes_photon_count() {
-            return Err(extent.bytes(settings));
-        }
-        let pixels = extent.bytes(&Settings { photons: 0, ..settings.clone() });
-        let left = self.bytes.saturating_sub(pixels);
-        let bytes_per_light_path = extent.photons_per_path * PHOTON_BYTES as f64;
-        let least = (f64::from(MIN_PHOTONS) * bytes_per_light_path) as u64;
-        if left < least {
-            return Err(pixels + least);
-        }
-        if settings.method.has_one_map() {
-            let all = settings.photon_memory >> 20;
-            let less = format!("the photon map has room for {} MiB instead of {all}", left >> 20);
-            return Ok((Settings { photon_memory: left, ..settings.clone() }, less));
-        }
-        let photons = (left as f64 / bytes_per_light_path) as u32;
-        let less = format!("{photons} light paths an iteration instead of {}", settings.photons);
-        Ok((Settings { photons, ..settings.clone() }, less))
-    }
-
-    /// [`MemoryLimit::shrink`] of methods with a number of light paths per pixel.
-    fn shrink_light_paths(self, extent: Extent, settings: &Settings) -> std::result::Result<(Settings, String), u64> {
-        let with = |light_paths: u32| {
-            let counts = Counts { light_paths, ..settings.counts };
-            Settings { counts, ..settings.clone() }
+        let method = settings.method;
+        let with = |number: u64| match method {
+            _ if method.has_one_map() => Settings { photon_memory: number, ..settings.clone() },
+            _ if method.takes_photon_count() => Settings { photons: number as u32, ..settings.clone() },
+            _ => Settings { counts: Counts { light_paths: number as u32, ..settings.counts }, ..settings.clone() },
         };
-        let asked = settings.counts.light_paths;
-        let fitted = (1..asked).rev().map(with).find(|settings| extent.bytes(settings) <= self.bytes);
-        let fitted = fitted.ok_or_else(|| extent.bytes(&with(asked.min(1))))?;
-        let [few, all] = [&fitted, settings].map(|settings| settings.counts.light_paths_per_pixel());
-        Ok((fitted, format!("--light-paths {few} instead of {all}")))
+        let (least, asked) = match method {
+            _ if method.has_one_map() => (MIN_PHOTONS * PHOTON_BYTES, settings.photon_memory),
+            _ if method.takes_photon_count() => (MIN_PHOTONS, u64::from(settings.photons)),
+            _ if method.takes_counts() => (1, u64::from(settings.counts.light_paths)),
+            _ => return Err(extent.bytes(settings)),
+        };
+        let fits = |number: u64| extent.bytes(&with(number)) <= self.bytes;
+        let (mut fitting, mut large) = (least.min(asked), asked);
+        if !fits(fitting) {
+            return Err(extent.bytes(&with(fitting)));
+        }
+        while fitting + 1 < large {
+            let middle = fitting + (large - fitting) / 2;
+            *if fits(middle) { &mut fitting } else { &mut large } = middle;
+        }
+        let fitted = with(fitting);
+        let less = if method.has_one_map() {
+            format!("the photon map has room for {} MiB instead of {}", fitting >> 20, asked >> 20)
+        } else if method.takes_photon_count() {
+            format!("{fitting} light paths an iteration instead of {asked}")
+        } else {
+            let [few, all] = [&fitted, settings].map(|settings| settings.counts.light_paths_per_pixel());
+            format!("--light-paths {few} instead of {all}")
+        };
+        Ok((fitted, less))
     }
 
     /// Makes the error of a render that needs at least `least` bytes, more than the limit.
@@ -249,8 +284,10 @@ pub(super) struct MemoryCheck<'a> {
     pub view: View<'a>,
     /// Value of `--method`, for messages.
     pub method: &'a str,
-    /// Whether the picture is finished.
-    pub finishes: bool,
+    /// The layers to write.
+    pub layers: &'a Selection,
+    /// The denoiser that the user asks for; `None` without a finish.
+    pub finish: Option<DenoiserChoice>,
     /// The user's limit; `None`: the memory of the machine alone.
     pub limit: Option<MemoryLimit>,
 }
@@ -261,14 +298,14 @@ impl MemoryCheck<'_> {
     /// # Errors
     /// The render does not fit into the limit, or into the memory of the machine.
     pub fn fit(&self, settings: Settings) -> Result<(Settings, Option<String>)> {
-        let channels = layers::channels(&layer_shape(&settings, self.view.scene));
-        let extent = Extent::new(self.view, &settings, channels);
+        let photons_per_path = mean_photons(self.view.scene, self.view.camera, &settings);
+        let extent = Extent::with_photons(self.view, &settings, (self.layers, self.finish), photons_per_path);
         let (settings, warning) = match self.limit {
             Some(limit) => limit.fit(extent, settings, self.method)?,
             None => (settings, None),
         };
-        let finish = if self.finishes { finish_bytes(extent.film, extent.groups, extent.lobes) } else { 0 };
-        let free = memory::available().map_or(u64::MAX, |available| available.bytes).saturating_sub(finish);
+        let library = if self.finish.is_some() { finish::library_bytes() } else { 0 };
+        let free = memory::available().map_or(u64::MAX, |available| available.bytes).saturating_sub(library);
         let (settings, warning) = if extent.bytes(&settings) <= free {
             (settings, warning)
         } else {
@@ -281,7 +318,7 @@ impl MemoryCheck<'_> {
         let (paths, remedy) = self.describe(&settings);
         let (width, height) = extent.film;
         let remedy = format!("{remedy}{}", extent.long_paths());
-        require(extent.bytes(&settings) + finish, format_args!("{width} x {height} pixels{paths}"), &remedy)?;
+        require(extent.bytes(&settings) + library, format_args!("{width} x {height} pixels{paths}"), &remedy)?;
         Ok((settings, warning))
     }
 
@@ -293,13 +330,11 @@ impl MemoryCheck<'_> {
             if settings.method.takes_photon_count() {
                 return true;
             }
-            let MemoryCheck { view: View { scene, camera }, finishes, limit, .. } = self;
-            let photons_per_path = *photons_per_path.get_or_init(|| mean_photons(scene, camera, settings));
-            let channels = layers::channels(&layer_shape(settings, scene));
-            let extent = Extent::with_photons(self.view, settings, channels, photons_per_path);
-            let finish = if finishes { finish_bytes(extent.film, extent.groups, extent.lobes) } else { 0 };
-            let bytes = extent.bytes(settings);
-            bytes.saturating_add(finish) <= free && limit.is_none_or(|limit| bytes <= limit.bytes)
+            let MemoryCheck { view, layers, finish, limit, .. } = self;
+            let photons_per_path = *photons_per_path.get_or_init(|| mean_photons(view.scene, view.camera, settings));
+            let bytes = Extent::with_photons(view, settings, (layers, finish), photons_per_path).bytes(settings);
+            let library = if finish.is_some() { finish::library_bytes() } else { 0 };
+            bytes.saturating_add(library) <= free && limit.is_none_or(|limit| bytes <= limit.bytes)
         }
     }
 
@@ -317,14 +352,26 @@ impl MemoryCheck<'_> {
     }
 }
 
-/// Checks that several renders fit into memory at the same time.
+/// Checks that several renders fit into memory at the same time, and one at a time the finishes of those that have a
+/// denoiser.
 ///
 /// # Errors
 /// They do not fit.
-pub fn check_all<'a>(view: View<'_>, all: impl Iterator<Item = &'a Settings>) -> Result<()> {
+pub fn check_all<'a>(view: View<'_>, all: impl Iterator<Item = (&'a Settings, Option<DenoiserChoice>)>) -> Result<()> {
     let (width, height) = view.camera.size();
-    let bytes = |settings| Extent { groups: 0, ..Extent::new(view, settings, FINISH_CHANNELS) }.bytes(settings);
-    require(all.map(bytes).sum(), format_args!("all runs together at {width} x {height} pixels"), "fewer runs")
+    let (mut renders, mut finishing) = (0, 0);
+    for (settings, finish) in all {
+        let photons_per_path = mean_photons(view.scene, view.camera, settings);
+        let alone = (&Selection::Beauty, None);
+        renders += Extent::with_photons(view, settings, alone, photons_per_path).bytes(settings);
+        if let Some(denoiser) = finish {
+            let layers = LayerCounts::new(&layer_shape(settings, view.scene), &Selection::Beauty, true);
+            let pixels = pixels((width, height));
+            let bytes = 4 * pixels * layers.channels as u64 + finish::bytes(pixels, 0, denoiser);
+            finishing = finishing.max(bytes + finish::library_bytes());
+        }
+    }
+    require(renders + finishing, format_args!("all runs together at {width} x {height} pixels"), "fewer runs")
 }
 
 /// Fails if `what` needs more bytes than there are.
@@ -338,29 +385,33 @@ mod tests {
     use crate::render::Method;
 
     fn extent(film: (u32, u32), whole: (u32, u32)) -> Extent {
-        Extent { film, whole, channels: 93, groups: 0, lobes: false, photons_per_path: 2.5 }
+        let layers = LayerCounts { channels: 8, ..LayerCounts::default() };
+        Extent { film, whole, layers, groups: 0, lobes: false, photons_per_path: 2.5, kinds: 2, finish: None }
     }
 
     #[test]
     fn a_finish_needs_memory_for_its_pixels_and_parts() {
-        let [small, large] = [(320, 180), (1920, 1080)].map(|size| finish_bytes(size, 0, false) - finish::bytes(0, 0));
-        assert!(large > 20 * small && large < 36 * small, "{small} {large}");
-        assert_eq!(
-            finish_bytes((320, 180), 3, false),
-            finish_bytes((320, 180), 0, false) + 320 * 180 * 6 * finish::BYTES_PER_PIXEL_OF_PART
-        );
-        assert!(finish_bytes((1 << 16, 1 << 16), 1000, true) > 1 << 40);
+        let settings = Settings { method: Method::Path, iterations: Some(4), ..Settings::default() };
+        let bytes = |size, parts, finish| {
+            let layers = LayerCounts { channels: 80, parts, ..LayerCounts::default() };
+            Extent { layers, finish, ..extent(size, size) }.bytes(&settings)
+        };
+        let [small, large] = [(320, 180), (640, 720)].map(|size| bytes(size, 8, Some(DenoiserChoice::Own)));
+        assert!(large > 7 * small && large <= 8 * small, "{small} {large}");
+        let oidn = bytes((320, 180), 8, Some(DenoiserChoice::Oidn));
+        assert!(oidn > small && small > bytes((320, 180), 0, None));
+        assert!(bytes((320, 180), 20, Some(DenoiserChoice::Oidn)) > oidn);
+        assert!(bytes((1 << 16, 1 << 16), 1000, Some(DenoiserChoice::Oidn)) > 1 << 40);
     }
 
     #[test]
     fn the_largest_picture_does_not_overflow() {
-        let none = Settings { photons: 0, ..Settings::default() };
-        let some = Settings { photons: 1000, ..Settings::default() };
-        let one = extent((1, 1), (1, 1)).bytes(&none);
-        assert!(one > 93 * 4);
+        let settings = Settings { photons: 0, ..Settings::default() };
+        let one = extent((1, 1), (1, 1)).bytes(&settings);
+        assert!(one > 8 * 4);
         let largest = (1 << 16, 1 << 16);
-        assert_eq!(extent(largest, largest).bytes(&some), (one << 32) + 2500 * PHOTON_BYTES);
-        let merged = Settings { method: Method::Vcm, ..none };
+        assert_eq!(extent(largest, largest).bytes(&settings), one << 32);
+        let merged = Settings { method: Method::Vcm, ..settings };
         assert!(extent((1, 1), (1, 1)).bytes(&merged) > one);
     }
 

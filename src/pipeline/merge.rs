@@ -138,7 +138,8 @@ impl Shards {
         layers::check(&request.layers, &facts.shape, request.finish.is_some(), facts.motion.is_some())?;
         let levels = Some(part.settings.levels.count);
         let mut finish = request.finish.as_ref().map(|wanted| finish::open(wanted, levels)).transpose()?;
-        memory::check_merge(&part, &facts.shape, finish.is_some())?;
+        let denoiser = request.finish.as_ref().map(|finish| finish.denoiser);
+        memory::check_merge(&part, &facts.shape, &request.layers, denoiser)?;
         let (width, height) = part.size;
         let mut pixels: Vec<PixelAccumulator> = crate::memory::reserve(width as usize * height as usize, "pixels")?;
         for (path, file) in &mut files {

@@ -10,6 +10,8 @@ use crate::advice;
 use crate::camera::Camera;
 use crate::choose::{Choice, PilotResult};
 use crate::error::Result;
+use crate::film::Selection;
+use crate::finish::DenoiserChoice;
 use crate::path_class::Switches;
 use crate::plan::switch::Removed;
 use crate::plan::{self, Plan};
@@ -70,7 +72,8 @@ pub fn plan_picture(picture: &PictureRequest, path: &Path, loaded: &Loaded, stop
     let Loaded { scene, removed, .. } = loaded;
     let checked = check_picture(picture, path, scene)?;
     let view = View::new(scene, &checked.camera);
-    let memory = MemoryCheck { view, method: "auto", finishes: true, limit: None };
+    let finish = Some(DenoiserChoice::default());
+    let memory = MemoryCheck { view, method: "auto", layers: &Selection::All, finish, limit: None };
     let chosen = choose(&picture.settings, checked.settings, view, memory.admits(), stop);
     let SettingsRequest { max_depth, switches, .. } = picture.settings;
     let mut plan = plan(PlanInput { chosen: &chosen, max_depth, switches }, view, removed);
@@ -92,7 +95,8 @@ pub(super) struct Planned {
 /// The render does not fit.
 pub(super) fn plan_render(request: &Request, chosen: &Chosen, view: View<'_>, removed: &Removed) -> Result<Planned> {
     let (method, finishes) = (chosen.settings.method.name(), request.finish.is_some());
-    let memory = MemoryCheck { view, method, finishes, limit: request.memory };
+    let finish = request.finish.as_ref().map(|finish| finish.denoiser);
+    let memory = MemoryCheck { view, method, layers: &request.layers, finish, limit: request.memory };
     let (settings, less_memory) = memory.fit(chosen.settings.clone())?;
     let SettingsRequest { max_depth, switches, .. } = request.picture.settings;
     let mut plan = plan(PlanInput { chosen, max_depth, switches }, view, removed);

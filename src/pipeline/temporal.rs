@@ -63,6 +63,13 @@ impl FrameFiles {
         let mut remarks = self.gaps(number);
         self.held.retain(|frame, _| around.contains(frame));
         self.joined.retain(|frame, _| around.contains(frame));
+        let missing = around.iter().filter(|frame| !self.held.contains_key(frame)).count();
+        if missing > 0 {
+            let path = self.path(number)?.to_owned();
+            let header = RenderedFile::read_header(&path)?.set;
+            let checked = finish.finish().check_memory_of_frames(&header, missing);
+            checked.map_err(|error| error.within(path.display()))?;
+        }
         for &frame in &around {
             if !self.held.contains_key(&frame) {
                 let held = self.read(frame, finish, &mut remarks)?;

@@ -64,6 +64,11 @@ pub fn memory_limits() -> [(Option<u64>, &'static str); 3] {
     ]
 }
 
+/// Whether a limit of memory (`ulimit -v`) counts addresses that are reserved and never used.
+pub fn counts_unused_addresses() -> bool {
+    getrlimit(Resource::As).current.is_some()
+}
+
 /// Parses a line of `/proc`, such as `MemAvailable:  123 kB`, and returns the bytes.
 fn parse_kib(text: &str, key: &str) -> Option<u64> {
     let line = text.lines().find_map(|line| line.strip_prefix(key))?;

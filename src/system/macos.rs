@@ -37,6 +37,11 @@ pub fn memory_limits() -> [(Option<u64>, &'static str); 1] {
     [(caustique_system::free_memory(), "available")]
 }
 
+/// Whether a limit of memory counts addresses that are reserved and never used.
+pub fn counts_unused_addresses() -> bool {
+    false
+}
+
 /// Name of this machine.
 pub fn host() -> String {
     rustix::system::uname().nodename().to_string_lossy().into_owned()

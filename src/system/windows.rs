@@ -166,6 +166,11 @@ pub fn memory_limits() -> [(Option<u64>, &'static str); 2] {
     [(free, "available"), (page_file, "left in memory and page file")]
 }
 
+/// Whether a limit of memory counts addresses that are reserved and never used.
+pub fn counts_unused_addresses() -> bool {
+    false
+}
+
 /// Name of this machine.
 pub fn host() -> String {
     std::env::var("COMPUTERNAME").unwrap_or_default()

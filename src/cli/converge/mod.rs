@@ -66,7 +66,8 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     let interrupt = Interrupt::install()?;
     let runs = choose_all(args, runs, view)?;
     interrupt.check_before_first_iteration(&args.output)?;
-    memory::check_all(view, runs.iter().map(|(run, _)| &run.entry.settings))?;
+    let denoiser = |run: &Run| (!run.args.no_finish).then_some(run.args.finish.denoise);
+    memory::check_all(view, runs.iter().map(|(run, _)| (&run.entry.settings, denoiser(run))))?;
     let seeds: Vec<u64> = (0..args.seeds).map(|i| args.seed.wrapping_add(i)).collect();
     let mut notes = Vec::new();
     let source = reference::source(args, view, &runs, &seeds, &mut notes)?;
