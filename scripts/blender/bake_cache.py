@@ -115,9 +115,9 @@ def trees_of(tree):
 
 
 def nodes_key(tree, frame, *parts):
-    """A key of values that Cycles evaluates from a node tree, or None if they may depend on more than can be hashed.
+    """A hash of all that the values depend on which Cycles evaluates from a node tree; None if it cannot be known.
 
-    `frame`: the number and the fraction, which count if the tree has animated values, image sequences or movies.
+    `frame`: number and fraction of the frame; part of the hash if the tree has animated values, image sequences or movies.
     """
     trees = list(trees_of(tree))
     nodes = [node for one in trees for node in one.nodes]

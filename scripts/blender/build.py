@@ -62,7 +62,7 @@ def _image_node(tree, image):
 
 
 def metal(name, color, roughness=0.0):
-    """A conductor of this reflectance at normal incidence."""
+    """A conductor: `color` is its reflectance at normal incidence."""
     return principled(name, color, roughness, Metallic=1.0)
 
 

@@ -151,8 +151,8 @@ def primvar(prim, name, stage):
 
 
 def expanded(found, name, faces, stage, fallback):
-    """The values (corners, width) of a primvar that `primvar` found, at each corner. If their number is wrong, there is a
-    loss, and all are `fallback`."""
+    """The values of a primvar at each corner of the faces, an array (corners, width). `found`: result of `primvar`. If the
+    number of its values is wrong, the stage reports a loss, and all values are `fallback`."""
     values, interpolation = found
     if interpolation == UsdGeom.Tokens.constant and len(values) > 1:
         stage.losses.add(faces.where, f"{name} has {len(values)} values, and constant interpolation takes 1: the first is "

@@ -56,8 +56,8 @@ pub(super) struct WeighedEffect {
     cost_without: Option<Cost>,
 }
 
-/// Effects present that are properties of the scene, such as dispersion: to measure one, a scene without it has to be
-/// built.
+/// Effects of the scene that no setting of a render leaves out, such as dispersion. What such an effect costs is
+/// measured in a second scene, which is built without it.
 pub(super) fn scene_effects(presence: &Presence) -> Vec<Effect> {
     Effect::ALL.into_iter().filter(|effect| !effect.is_class() && presence.has(*effect)).collect()
 }

@@ -50,7 +50,7 @@ pub fn path(path: &Path) -> Cow<'_, str> {
     path.to_string_lossy()
 }
 
-/// Prints an event if messages are events.
+/// Prints an event with its fields as a line of JSON, with `--progress json`; does nothing otherwise.
 pub fn print(event: &str, fields: impl Serialize) {
     if !are_in_use() {
         return;

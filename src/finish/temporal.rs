@@ -502,7 +502,7 @@ mod tests {
     const SIZE: Size = Size { width: 64, height: 24 };
     const MIDDLE: f64 = REACH as f64;
 
-    /// A frame of a still camera with light `truth` of the column and independent noise of standard deviation `sigma`.
+    /// A frame of a still camera: each pixel is `truth(column)` with independent noise of standard deviation `sigma`.
     fn frame(truth: impl Fn(f32) -> f32, sigma: f32, seed: u64) -> Frame {
         let of_quarter = |k: u64| {
             Picture::from_fn(SIZE, |i| {

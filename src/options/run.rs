@@ -9,7 +9,7 @@ use crate::pipeline::memory::MemoryLimit;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// How a render runs and what its file holds.
+/// Options about running a render (memory, threads, checkpoints), and about the contents of the EXR.
 #[derive(clap::Args, Clone, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub struct RunOptions {

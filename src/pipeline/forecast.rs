@@ -13,7 +13,7 @@ use serde::Serialize;
 
 /// Largest number of pixels of the pilot, the small render from which a forecast follows.
 const MAX_PIXELS: f64 = 240.0 * 160.0;
-/// Smallest number of pixels of the pilot.
+/// Smallest number of pixels of the pilot, the small render from which a forecast follows.
 const MIN_PIXELS: f64 = 1024.0;
 /// Core-seconds after which the pilot of a forecast ends, if it has enough iterations for an error estimate and the
 /// forecast render is short.

@@ -338,7 +338,7 @@ impl MemoryCheck<'_> {
         }
     }
 
-    /// Names, for messages, the light paths or the method of a render, and how it takes less memory.
+    /// Two parts of messages: the light paths or the method that need the memory, and what reduces it.
     fn describe(&self, settings: &Settings) -> (String, &'static str) {
         let method = settings.method;
         let is_chosen = method.name() == self.method;

@@ -38,7 +38,8 @@ pub struct EffectPlan {
     /// Core-seconds per iteration that a render would save without the effect; `None` if no pilot (a small test render)
     /// has counted them.
     pub seconds_per_iteration: Option<f64>,
-    /// `seconds_per_iteration` over the core-seconds of a whole iteration, 0 to 1; `None` if no pilot has counted them.
+    /// Share of an iteration's core-seconds that a render would save without the effect, 0 to 1; `None` as
+    /// `seconds_per_iteration`.
     pub time: Option<f64>,
     /// Relative error (the root of relMSE) that a picture has without the effect; `None` if no pilot has measured it.
     pub error_if_off: Option<f64>,

@@ -26,7 +26,8 @@ pub const BANDS: u8 = 8;
 /// Number of wavelengths, in bands at equal distances, that a split camera path takes at dispersive glass.
 pub const SPREAD: u8 = 2;
 
-/// Channels of weights below this are treated as zero: [`Wavelength::inverse_weight`] is then zero, too.
+/// A channel of a wavelength's weight below this counts as zero, and so does this channel of
+/// [`Wavelength::inverse_weight`].
 const MIN_WEIGHT: f32 = 1e-6;
 
 /// The uniform number in `[0, 1)` that determines the wavelength of a path if it meets dispersive glass.

@@ -95,7 +95,7 @@ def _start(job, stopped):
 
 @bpy.app.handlers.persistent
 def end(*_):
-    """End the kept exporter, if there is one."""
+    """End the exporter that is kept between renders, if there is one, and delete its files."""
     global _kept
     kept, _kept = _kept, None
     if kept is not None:

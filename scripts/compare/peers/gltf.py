@@ -103,7 +103,7 @@ OWN = {"diffuse_roughness", "coat_color", "coat_ior", "sheen_model"}
 
 
 def extras(part):
-    """`extras.caustique` of a part of the document."""
+    """The dict `extras.caustique` of a glTF object, such as a node or a material; empty if there is none."""
     return part.get("extras", {}).get("caustique", {})
 
 

@@ -83,8 +83,8 @@ impl Rendered {
         header
     }
 
-    /// The header's key `unseen`: photons stored and gathered, by kind, and the relative error by light that photons
-    /// have hardly brought.
+    /// Value of the header's key `unseen`: the numbers of photons that were stored and gathered, by kind of photon, and the
+    /// relative error due to light that too few photons have carried.
     fn unseen_header(&self) -> Value {
         let PhotonCounts { stored, gathered } = self.stats.photon_record.counts;
         let counts = |kind: Kind| json!({"stored": stored[kind as usize], "gathered": gathered[kind as usize]});

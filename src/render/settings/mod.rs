@@ -82,8 +82,8 @@ pub struct Settings {
     pub indirect: Indirect,
     /// Classes of light paths (such as caustics) that the render finds.
     pub classes: ClassSet,
-    /// Guide the starts of light paths toward objects that focus light, if a pilot finds that it pays. See
-    /// [`Method::supports_guiding`].
+    /// Whether light paths start preferably towards objects that focus light, as far as a pilot (a short render before
+    /// the first iteration) finds that this reduces the noise. See [`Method::supports_guiding`].
     pub guided: bool,
     /// Bandwidth levels: pictures with different kernel bandwidths that one render makes.
     pub levels: Levels,

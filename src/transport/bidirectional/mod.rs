@@ -339,7 +339,8 @@ impl MergeLevels {
         all
     }
 
-    /// Makes each camera path of the pixel merge with this probability, above 0. All etas must contain it.
+    /// Sets the probability, above 0, with which a camera path of the pixel merges. The etas that were given must have this
+    /// probability as a factor.
     #[must_use]
     #[inline]
     pub fn with_probability(self, probability: f32) -> MergeLevels {

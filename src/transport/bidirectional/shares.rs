@@ -63,7 +63,8 @@ pub(in crate::transport) struct Incident {
     pub f: Rgb,
 }
 
-/// Kinds of bounces that the lobes of a vertex other than delta make: broad first, and sharp if there are both.
+/// Kinds of bounces that the lobes `smooth` (those that are not delta) make: two kinds, broad and sharp, if there are
+/// both; otherwise one.
 #[inline]
 fn events(smooth: LobeSet, in_medium: bool) -> (Event, Option<Event>) {
     match smooth {

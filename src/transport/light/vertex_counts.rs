@@ -55,7 +55,7 @@ pub struct VertexCounts {
     pub merged: f64,
 }
 
-/// Position of a vertex that has lobes other than delta.
+/// Position in space, and geometric normal, of a vertex that photons can merge with: it has lobes that are not delta.
 #[derive(Clone, Copy)]
 struct Open {
     p: Vec3,

@@ -376,7 +376,8 @@ impl Interior {
     }
 }
 
-/// Priority and rank of an instance; of several solids around a point, the one with the larger pair fills the space.
+/// Priority of an instance, and its rank among instances of equal priority. Of several solids around a point, the one
+/// with the larger pair fills the space.
 #[inline]
 fn strength(scene: &Scene, instance: u32) -> (i32, u32) {
     let material = scene.shapes.instances[instance as usize].material;
@@ -404,7 +405,8 @@ fn push_solid(scene: &Scene, outer: u32, last: u32) -> Option<u32> {
     scene.solid_stacks.push(SolidStack { outer, last, host })
 }
 
-/// Removes the last solid of an object from a stack. Returns the stack and the entry; `None` if the stack has none.
+/// Removes the solid of an object that was entered last from a stack. Returns the new stack and the removed instance;
+/// `None` if no solid of the object is in the stack.
 fn remove_solid(scene: &Scene, stack: u32, object: u32) -> Option<(u32, u32)> {
     if stack == EMPTY_STACK {
         return None;

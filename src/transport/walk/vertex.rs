@@ -216,8 +216,8 @@ pub trait Visitor<'a>: Sized {
     fn pass_through_light(&mut self, hit: &PassThroughHit, scattered: Option<Scattered>) {
         let _ = (hit, scattered);
     }
-    /// Whether [`Visitor::medium_light`] is to be called for the segment behind the last vertex, which scattered the
-    /// path by `scattered`.
+    /// Whether [`Visitor::medium_light`] is to be called for the segment that the path follows now. `scattered`: how the
+    /// path was scattered at the start of the segment; `None` at the start of the path.
     #[inline]
     fn sees_medium_light(&self, scattered: Option<Scattered>) -> bool {
         let _ = scattered;
