@@ -8,7 +8,7 @@ use super::cone::Cone;
 use super::emission::{DirectSample, EmissionDensity, EmissionSample, EntryDisc};
 use super::group::{Group, Groups};
 use super::kind::{
-    Emitter, EnvironmentLight, Light, LightRay, Owner, SceneParts, Selected, TriangleLight, VolumeLight,
+    Arrival, Emitter, EnvironmentLight, Light, LightRay, Owner, SceneParts, Selected, TriangleLight, VolumeLight,
 };
 use super::receiver::Receiver;
 use super::sampler::LightSampler;
@@ -196,12 +196,16 @@ impl Lights {
         self.choice.as_ref().map(|choice| choice.power())
     }
 
-    /// Probability of selecting a light for next-event estimation at a receiver, over the probability of selecting it
-    /// for the start of a light path.
+    /// Density with which next-event estimation at a receiver samples a point of a light, or the direction `wi` towards
+    /// light from infinity, over the density with which light paths start there.
     #[inline]
-    pub fn choice_ratio(&self, receiver: &Receiver, light: u32) -> f32 {
-        let Some(choice) = &self.choice else { return 1.0 };
-        choice.pdf(receiver, light as usize) / choice.power().pdf(light as usize)
+    pub fn next_event_ratio(&self, receiver: &Receiver, light: u32, wi: Vec3) -> f32 {
+        let (Some(choice), index) = (&self.choice, light as usize) else { return 1.0 };
+        let chosen = choice.pdf(receiver, index) / choice.power().pdf(index);
+        match self.emitters[index].arriving(&self.sky, receiver, wi, false) {
+            Some(Arrival { direct, start, .. }) if start > 0.0 => chosen * (direct / start),
+            _ => chosen,
+        }
     }
 
     /// Ranges of emitter indices that belong to one object (the triangles of an instance, or a single other light),
@@ -264,7 +268,7 @@ impl Lights {
     ) -> Option<DirectSample> {
         let (index, probability) = self.choice.as_ref()?.sample(receiver, choice)?;
         let (scene, selected) = (self.scene(shapes, materials), Selected { light: index as u32, probability });
-        let mut sample = self.emitters[index].sample(&scene, receiver.p, selected, u)?;
+        let mut sample = self.emitters[index].sample(&scene, receiver, selected, u)?;
         sample.arrival_factor *= self.choice()?.pdf(index) / probability;
         Some(sample)
     }
@@ -353,9 +357,9 @@ impl Lights {
     ) {
         let Some(choice) = &self.choice else { return };
         for &index in self.infinite.iter() {
-            if let Some((radiance, pdf)) = self.emitters[index as usize].arriving(&self.sky, d, camera) {
+            if let Some(light) = self.emitters[index as usize].arriving(&self.sky, from, d, camera) {
                 let [direct, start] = [choice.pdf(from, index as usize), choice.power().pdf(index as usize)];
-                each(radiance, direct * pdf, start * pdf, self.group(index));
+                each(light.radiance, direct * light.direct, start * light.start, self.group(index));
             }
         }
     }

@@ -92,10 +92,10 @@ fn irradiance_is_correct_and_near_lamps_are_sampled_most() {
             "at {p}: {mean} +- {power_error}, expected {expected}"
         );
         least = least.min((power_error / error).powi(2));
-        // The planted bug: the sky divided by the probability of choosing it for emission.
+        // The planted bug: the sky divided by its density in emission.
         let sky = (0..).zip(scene.lights.emitters()).find(|(_, e)| e.is_infinite()).map_or(0, |(i, _)| i);
-        let chosen = f64::from(scene.lights.choice_ratio(&receiver, sky));
-        let wrong = |light: &DirectSample| if light.target.is_none() { chosen } else { 1.0 };
+        let chosen = |wi| f64::from(scene.lights.next_event_ratio(&receiver, sky, wi));
+        let wrong = |light: &DirectSample| if light.target.is_none() { chosen(light.wi) } else { 1.0 };
         let values = estimates(&scene, &receiver, 50_000, wrong);
         let (mean, error) = mean_and_error(&values);
         assert!((mean - expected).abs() > critical * error, "at {p}: a wrong probability is not detected");

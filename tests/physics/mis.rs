@@ -609,7 +609,7 @@ impl<'a> Lab<'a> {
         let square = |d: f32| f64::from(d) * f64::from(d);
         for (technique, from, ratios) in by_light.0.into_iter().chain(by_camera.0) {
             let density = emitted.as_ref().zip(from_light.first()).map(|(e, met)| EmissionDensity {
-                direct: e.density.start * scene.lights.choice_ratio(&met.receiver(), e.light),
+                direct: e.density.start * scene.lights.next_event_ratio(&met.receiver(), e.light, met.wo),
                 ..e.density
             });
             let infinity =
@@ -661,7 +661,9 @@ impl<'a> Lab<'a> {
                         None => EmissionDensity {
                             direct: sample.pdf_w,
                             start: sample.pdf_w
-                                / environment.map_or(1.0, |light| scene.lights.choice_ratio(&met.receiver(), light)),
+                                / environment.map_or(1.0, |light| {
+                                    scene.lights.next_event_ratio(&met.receiver(), light, sample.wi)
+                                }),
                             onward: scene.lights.entry_pdf_a(met.p, sample.wi),
                             ..infinity
                         },

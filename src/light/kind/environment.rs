@@ -1,10 +1,10 @@
 //! The environment as a light.
 
-use super::{Light, LightRay, Owner, SceneParts, Selected};
+use super::{Arrival, Light, LightRay, Owner, SceneParts, Selected};
 use crate::geometry::Shapes;
 use crate::light::bounds::Bounds;
 use crate::light::environment::EnvironmentSample;
-use crate::light::{Cone, DirectSample, EmissionSample, Sky};
+use crate::light::{Cone, DirectSample, EmissionSample, Receiver, Sky};
 use crate::math::{Rgb, Vec2, Vec3, luminance};
 use std::f32::consts::PI;
 
@@ -58,9 +58,12 @@ impl Light for EnvironmentLight {
     }
 
     #[inline]
-    fn sample(&self, scene: &SceneParts, _: Vec3, selected: Selected, u: Vec2) -> Option<DirectSample> {
-        let EnvironmentSample { wi, pdf_w, radiance } = scene.sky.environment.as_ref()?.sample(u)?;
-        let sample = selected.infinite(wi, radiance, pdf_w, false);
+    fn sample(&self, scene: &SceneParts, at: &Receiver, selected: Selected, u: Vec2) -> Option<DirectSample> {
+        let environment = scene.sky.environment.as_ref()?;
+        let EnvironmentSample { wi, pdf_w: start, radiance } = environment.sample_at(at.n, u)?;
+        let direct = environment.pdf_w_at(at.n, wi, start);
+        let mut sample = selected.infinite(wi, radiance, direct, false);
+        sample.arrival_factor = start / direct;
         (sample.pdf_w > 0.0).then_some(sample)
     }
 
@@ -82,8 +85,9 @@ impl Light for EnvironmentLight {
     }
 
     #[inline]
-    fn arriving(&self, sky: &Sky, d: Vec3, camera: bool) -> Option<(Rgb, f32)> {
-        let seen = !(camera && sky.hidden_from_camera);
-        sky.environment.as_ref().filter(|_| seen).map(|environment| environment.radiance_and_pdf_w(d))
+    fn arriving(&self, sky: &Sky, at: &Receiver, d: Vec3, camera: bool) -> Option<Arrival> {
+        let environment = sky.environment.as_ref().filter(|_| !(camera && sky.hidden_from_camera))?;
+        let (radiance, start) = environment.radiance_and_pdf_w(d);
+        Some(Arrival { radiance, direct: environment.pdf_w_at(at.n, d, start), start })
     }
 }

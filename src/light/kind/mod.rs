@@ -18,7 +18,7 @@ pub use triangle::TriangleLight;
 pub use volume::VolumeLight;
 
 use super::bounds::Bounds;
-use super::{Bulb, Cone, DirectSample, EmissionSample, Sky, SpotCone, SpotEdge};
+use super::{Bulb, Cone, DirectSample, EmissionSample, Receiver, Sky, SpotCone, SpotEdge};
 use crate::geometry::Shapes;
 use crate::material::Materials;
 use crate::math::{Rgb, Vec2, Vec3};
@@ -90,6 +90,15 @@ impl Selected {
     }
 }
 
+/// Light from infinity along a direction; its densities do not include the selection of the light.
+pub struct Arrival {
+    pub radiance: Rgb,
+    /// Density per solid angle of the direction in [`Light::sample`].
+    pub direct: f32,
+    /// Density per solid angle of the direction in [`Light::emit`].
+    pub start: f32,
+}
+
 /// A sampled ray that leaves a given light; its densities do not include the selection of the light.
 pub struct LightRay {
     pub origin: Vec3,
@@ -151,9 +160,9 @@ pub trait Light {
     /// light from infinity.
     fn point(&self, u: Vec2) -> Option<(Vec3, Option<Cone>)>;
 
-    /// Samples a point of the light, or a direction of light from infinity, as seen from `p`. `None` if the light does
-    /// not shine on `p`.
-    fn sample(&self, scene: &SceneParts, p: Vec3, selected: Selected, u: Vec2) -> Option<DirectSample>;
+    /// Samples a point of the light, or a direction of light from infinity, for a receiver. `None` if the light does not
+    /// shine on it.
+    fn sample(&self, scene: &SceneParts, receiver: &Receiver, selected: Selected, u: Vec2) -> Option<DirectSample>;
 
     /// Samples a ray that leaves the light; `back` selects the back side of a surface that emits from both.
     fn emit(&self, scene: &SceneParts, back: bool, point: Vec2, direction: Vec2) -> Option<LightRay>;
@@ -166,9 +175,9 @@ pub trait Light {
     /// gives `onward` and `cos`. `None` if the light emits nothing along `d`, and for light from infinity.
     fn redirected_flux(&self, emission: &EmissionSample, d: Vec3, onward: f32, cos: f32) -> Option<Rgb>;
 
-    /// Radiance of light from infinity that a ray along `d` reaches when it leaves the scene, and the density of `d` in
-    /// [`Light::sample`]. `None` if the ray reaches none. `camera`: the ray starts at the camera.
-    fn arriving(&self, sky: &Sky, d: Vec3, camera: bool) -> Option<(Rgb, f32)>;
+    /// Light from infinity that a ray from a receiver along `d` reaches when it leaves the scene. `None` if the ray
+    /// reaches none. `camera`: the ray starts at the camera.
+    fn arriving(&self, sky: &Sky, at: &Receiver, d: Vec3, camera: bool) -> Option<Arrival>;
 
     /// The bulb that camera paths see, if the light has one.
     fn bulb(&self) -> Option<Bulb> {

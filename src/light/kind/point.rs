@@ -1,9 +1,9 @@
 //! Point lights.
 
-use super::{Light, LightRay, Owner, SceneParts, Selected};
+use super::{Arrival, Light, LightRay, Owner, SceneParts, Selected};
 use crate::geometry::Shapes;
 use crate::light::bounds::Bounds;
-use crate::light::{Cone, DirectSample, EmissionSample, Sky};
+use crate::light::{Cone, DirectSample, EmissionSample, Receiver, Sky};
 use crate::math::{Rgb, Vec2, Vec3, luminance, warp};
 use std::f32::consts::{PI, TAU};
 
@@ -61,8 +61,8 @@ impl Light for PointLight {
     }
 
     #[inline]
-    fn sample(&self, _: &SceneParts, p: Vec3, selected: Selected, _: Vec2) -> Option<DirectSample> {
-        let to = self.p - p;
+    fn sample(&self, _: &SceneParts, receiver: &Receiver, selected: Selected, _: Vec2) -> Option<DirectSample> {
+        let to = self.p - receiver.p;
         let (distance2, wi) = (to.length_squared(), to.try_normalize()?);
         Some(selected.delta(wi, self.p, self.intensity / distance2, 0.5 / TAU / distance2))
     }
@@ -83,7 +83,7 @@ impl Light for PointLight {
     }
 
     #[inline]
-    fn arriving(&self, _: &Sky, _: Vec3, _: bool) -> Option<(Rgb, f32)> {
+    fn arriving(&self, _: &Sky, _: &Receiver, _: Vec3, _: bool) -> Option<Arrival> {
         None
     }
 }

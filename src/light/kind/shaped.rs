@@ -1,11 +1,11 @@
 //! Points and spots with a distribution of their own over directions.
 
-use super::{Light, LightPlacement, LightRay, Owner, SceneParts, Selected};
+use super::{Arrival, Light, LightPlacement, LightRay, Owner, SceneParts, Selected};
 use crate::geometry::Shapes;
 use crate::light::bounds::Bounds;
 use crate::light::bulb::ball_point;
 use crate::light::profile::polar_angle;
-use crate::light::{Bulb, Cone, DirectSample, Distribution, EmissionSample, Pattern, Sky};
+use crate::light::{Bulb, Cone, DirectSample, Distribution, EmissionSample, Pattern, Receiver, Sky};
 use crate::math::{Frame, Rgb, Vec2, Vec3, luminance};
 use std::f32::consts::PI;
 use std::sync::Arc;
@@ -111,9 +111,9 @@ impl Light for ShapedLight {
 
     // Not inlined, like `emit`, so that the common lights stay fast.
     #[inline(never)]
-    fn sample(&self, _: &SceneParts, p: Vec3, selected: Selected, u: Vec2) -> Option<DirectSample> {
+    fn sample(&self, _: &SceneParts, receiver: &Receiver, selected: Selected, u: Vec2) -> Option<DirectSample> {
         let at = self.origin(u);
-        let to = at - p;
+        let to = at - receiver.p;
         let (wi, distance2) = (to.try_normalize()?, to.length_squared());
         let radiance = self.intensity_along(-wi) / distance2;
         (radiance != Rgb::ZERO).then(|| selected.delta(wi, at, radiance, self.pdf_w(-wi) / distance2))
@@ -140,7 +140,7 @@ impl Light for ShapedLight {
     }
 
     #[inline]
-    fn arriving(&self, _: &Sky, _: Vec3, _: bool) -> Option<(Rgb, f32)> {
+    fn arriving(&self, _: &Sky, _: &Receiver, _: Vec3, _: bool) -> Option<Arrival> {
         None
     }
 

@@ -1,11 +1,11 @@
 //! Spots: cones of light with a soft edge.
 
-use super::{Light, LightPlacement, LightRay, Owner, SceneParts, Selected};
+use super::{Arrival, Light, LightPlacement, LightRay, Owner, SceneParts, Selected};
 use crate::geometry::Shapes;
 use crate::light::bounds::Bounds;
 use crate::light::bulb::ball_point;
 use crate::light::spot::{spot_falloff, spot_solid_angle};
-use crate::light::{Bulb, Cone, DirectSample, EmissionSample, Sky, SpotCone, SpotEdge};
+use crate::light::{Bulb, Cone, DirectSample, EmissionSample, Receiver, Sky, SpotCone, SpotEdge};
 use crate::math::{Frame, Rgb, Vec2, Vec3, luminance, one_minus_cos, warp};
 
 /// A light that shines into a cone with a soft edge, from a point, or uniformly from a disc across the axis of the cone.
@@ -111,9 +111,9 @@ impl Light for SpotLight {
     }
 
     #[inline]
-    fn sample(&self, _: &SceneParts, p: Vec3, selected: Selected, u: Vec2) -> Option<DirectSample> {
+    fn sample(&self, _: &SceneParts, receiver: &Receiver, selected: Selected, u: Vec2) -> Option<DirectSample> {
         let at = self.origin(u);
-        let to = at - p;
+        let to = at - receiver.p;
         let (distance2, wi) = (to.length_squared(), to.try_normalize()?);
         let falloff = self.falloff(-wi);
         if falloff == 0.0 {
@@ -151,7 +151,7 @@ impl Light for SpotLight {
     }
 
     #[inline]
-    fn arriving(&self, _: &Sky, _: Vec3, _: bool) -> Option<(Rgb, f32)> {
+    fn arriving(&self, _: &Sky, _: &Receiver, _: Vec3, _: bool) -> Option<Arrival> {
         None
     }
 

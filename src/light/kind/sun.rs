@@ -1,9 +1,9 @@
 //! Suns.
 
-use super::{Light, LightPlacement, LightRay, Owner, SceneParts, Selected};
+use super::{Arrival, Light, LightPlacement, LightRay, Owner, SceneParts, Selected};
 use crate::geometry::Shapes;
 use crate::light::bounds::Bounds;
-use crate::light::{Cone, DirectSample, EmissionSample, Sky};
+use crate::light::{Cone, DirectSample, EmissionSample, Receiver, Sky};
 use crate::math::{Frame, Rgb, Vec2, Vec3, luminance, one_minus_cos, warp};
 use std::f32::consts::PI;
 
@@ -79,7 +79,7 @@ impl Light for SunLight {
     }
 
     #[inline]
-    fn sample(&self, _: &SceneParts, _: Vec3, selected: Selected, u: Vec2) -> Option<DirectSample> {
+    fn sample(&self, _: &SceneParts, _: &Receiver, selected: Selected, u: Vec2) -> Option<DirectSample> {
         if self.is_delta() {
             return Some(selected.infinite(self.frame.n, self.irradiance, 1.0, true));
         }
@@ -109,9 +109,10 @@ impl Light for SunLight {
     }
 
     #[inline]
-    fn arriving(&self, _: &Sky, d: Vec3, camera: bool) -> Option<(Rgb, f32)> {
+    fn arriving(&self, _: &Sky, _: &Receiver, d: Vec3, camera: bool) -> Option<Arrival> {
         let size = self.one_minus_cos;
         let seen = one_minus_cos(d, self.frame.n) < size && !(camera && self.hidden_from_camera);
-        seen.then(|| (self.radiance(), warp::cone_uniform_pdf_w(size)))
+        let pdf_w = warp::cone_uniform_pdf_w(size);
+        seen.then(|| Arrival { radiance: self.radiance(), direct: pdf_w, start: pdf_w })
     }
 }

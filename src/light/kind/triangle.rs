@@ -1,9 +1,9 @@
 //! Triangles of emissive materials.
 
-use super::{Light, LightRay, Owner, SceneParts, Selected};
+use super::{Arrival, Light, LightRay, Owner, SceneParts, Selected};
 use crate::geometry::{Shapes, Surface, offset_origin, shadow_end, triangle_error};
 use crate::light::bounds::Bounds;
-use crate::light::{Cone, DirectSample, EmissionSample, Sky, Spread};
+use crate::light::{Cone, DirectSample, EmissionSample, Receiver, Sky, Spread};
 use crate::material::{Alpha, Objects};
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, luminance, warp};
 use std::f32::consts::PI;
@@ -190,16 +190,16 @@ impl Light for TriangleLight {
     }
 
     #[inline(always)]
-    fn sample(&self, scene: &SceneParts, p: Vec3, selected: Selected, u: Vec2) -> Option<DirectSample> {
+    fn sample(&self, scene: &SceneParts, receiver: &Receiver, selected: Selected, u: Vec2) -> Option<DirectSample> {
         // Most receivers are behind some one-sided light, so this cheap test comes first. Near the plane, rounding
         // decides.
         let ng = self.normal();
-        if !self.two_sided && ng.dot(p) <= self.plane.w {
+        if !self.two_sided && ng.dot(receiver.p) <= self.plane.w {
             return None;
         }
         let b = warp::triangle_uniform(u);
         let at = self.at(b);
-        let to = at - p;
+        let to = at - receiver.p;
         let distance2 = to.length_squared();
         let wi = to.try_normalize()?;
         let cos = -ng.dot(wi);
@@ -252,7 +252,7 @@ impl Light for TriangleLight {
     }
 
     #[inline]
-    fn arriving(&self, _: &Sky, _: Vec3, _: bool) -> Option<(Rgb, f32)> {
+    fn arriving(&self, _: &Sky, _: &Receiver, _: Vec3, _: bool) -> Option<Arrival> {
         None
     }
 }

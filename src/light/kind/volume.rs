@@ -1,9 +1,9 @@
 //! Media that emit.
 
-use super::{Light, LightRay, Owner, SceneParts, Selected};
+use super::{Arrival, Light, LightRay, Owner, SceneParts, Selected};
 use crate::geometry::Shapes;
 use crate::light::bounds::Bounds;
-use crate::light::{Cone, DirectSample, EmissionSample, Sky};
+use crate::light::{Cone, DirectSample, EmissionSample, Receiver, Sky};
 use crate::material::{EmissionGrid, MediumGrids};
 use crate::math::{Rgb, Vec2, Vec3, bounding_box, corners, luminance, warp};
 use glam::Affine3A;
@@ -106,9 +106,9 @@ impl Light for VolumeLight {
 
     // Not inlined, so that the common lights stay fast.
     #[inline(never)]
-    fn sample(&self, _: &SceneParts, p: Vec3, selected: Selected, u: Vec2) -> Option<DirectSample> {
+    fn sample(&self, _: &SceneParts, receiver: &Receiver, selected: Selected, u: Vec2) -> Option<DirectSample> {
         let (at, intensity) = self.origin(u)?;
-        let to = at - p;
+        let to = at - receiver.p;
         let (wi, distance2) = (to.try_normalize()?, to.length_squared());
         Some(selected.delta(wi, at, intensity / distance2, 0.5 / TAU / distance2))
     }
@@ -130,7 +130,7 @@ impl Light for VolumeLight {
     }
 
     #[inline]
-    fn arriving(&self, _: &Sky, _: Vec3, _: bool) -> Option<(Rgb, f32)> {
+    fn arriving(&self, _: &Sky, _: &Receiver, _: Vec3, _: bool) -> Option<Arrival> {
         None
     }
 }

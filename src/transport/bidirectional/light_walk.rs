@@ -7,7 +7,7 @@ use super::shares::{Incident, PathHalves, shares, wanted};
 use super::{Bidirectional, MergeLevels, PathRecorder, Technique};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::light::{Group, Receiver};
-use crate::math::{Rgb, is_lit};
+use crate::math::{Rgb, Vec3, is_lit};
 use crate::medium::FlightDensity;
 use crate::path_class::{CameraSuffix, Event, LightPrefix, Part, PathClass};
 use crate::random::Purpose;
@@ -119,14 +119,21 @@ struct LightWalk<'a, 's, R> {
 
 impl<R: PathRecorder> LightWalk<'_, '_, R> {
     #[inline(always)]
-    fn arrive(&mut self, at: &Receiver, distance: f32, cos: f32, flight: FlightDensity, scattered: Option<Scattered>) {
+    fn arrive(
+        &mut self,
+        (at, wi): (&Receiver, Vec3),
+        distance: f32,
+        cos: f32,
+        flight: FlightDensity,
+        scattered: Option<Scattered>,
+    ) {
         if let Some(scattered) = scattered {
             self.prefix = self.prefix.then(Event::at_vertex(scattered.lobe, self.lobes));
         }
         let first_from_infinity = scattered.is_none() && self.infinite;
         let distance2 = if first_from_infinity { 1.0 } else { distance * distance };
         if scattered.is_none() {
-            self.mis = self.mis.received(self.shared.camera_paths.scene.lights.choice_ratio(at, self.light));
+            self.mis = self.mis.received(self.shared.camera_paths.scene.lights.next_event_ratio(at, self.light, wi));
         }
         self.mis = self.mis.arrive(distance2, cos).fly(flight);
     }
@@ -209,7 +216,7 @@ impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
     fn surface(&mut self, vertex: &Vertex<'_, 's>, scattered: Option<Scattered>) -> Next {
         let Bidirectional { camera_paths, techniques, merged_paths, .. } = self.shared;
         self.arrive(
-            &vertex.receiver(),
+            (&vertex.receiver(), vertex.wo),
             vertex.distance,
             vertex.wo.dot(vertex.surface.ng).abs(),
             vertex.flight,
@@ -259,7 +266,7 @@ impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
     #[inline]
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
         let Bidirectional { camera_paths, techniques, .. } = self.shared;
-        self.arrive(&vertex.receiver(), vertex.arrival.distance, 1.0, vertex.flight, scattered);
+        self.arrive((&vertex.receiver(), vertex.wo), vertex.arrival.distance, 1.0, vertex.flight, scattered);
         self.lobes = None;
         let connected = self.shared.connects_light_vertex(vertex.depth);
         if connected && !self.photons_only && vertex.depth < camera_paths.max_depth {
