@@ -209,9 +209,8 @@ impl Observer for Reports<'_> {
             Event::Warning(warning) => self.warnings.push(warning.into()),
             Event::MomentFailed(error) => self.warnings.push(format!("{error}; the render has ended there")),
             Event::Progress(progress) => {
-                if self.progress.as_mut().is_some_and(|callback| !callback(progress)) {
-                    self.stop.store(true, Ordering::Relaxed);
-                }
+                let goes_on = self.progress.as_mut().is_none_or(|callback| callback(progress));
+                self.stop.fetch_or(!goes_on, Ordering::Relaxed);
             }
             _ => {}
         }

@@ -34,6 +34,8 @@ const BATCH: u32 = 1 << 16;
 /// Bytes per photon while the map is built: the photon in the order of tracing and sorted, its Morton code, and its
 /// share of the tree.
 pub const PHOTON_BYTES: u64 = 2 * size_of::<Photon>() as u64 + 16 + 32;
+/// The help of `--photon-memory` repeats this number.
+const _: () = assert!(PHOTON_BYTES == 160);
 
 /// Traces light paths until there are `most` photons or all paths are traced.
 fn trace(

@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::estimator::rule::chi_squared::ChiSquaredSettings;
 use crate::path_class::Switches;
 use crate::photon::Kernel;
-use crate::render::{InitialBandwidth, PHOTON_BYTES};
+use crate::render::InitialBandwidth;
 use crate::transport::{Indirect, MAX_LEVELS};
 use serde::Serialize;
 #[cfg(feature = "cli")]
@@ -182,7 +182,7 @@ pub struct SettingsRequest {
 }
 
 /// Help texts repeat these numbers.
-const _: () = assert!(MAX_LEVELS == 5 && PHOTON_BYTES == 160);
+const _: () = assert!(MAX_LEVELS == 5);
 const _: () = assert!(MAX_LIGHT_PATHS_PER_PIXEL == 4 && LIGHT_PATH_STEPS == 16 && MAX_CONNECTIONS == 4);
 
 impl SettingsRequest {
