@@ -205,7 +205,8 @@ impl Comparison {
             check_settings(of, scene.path, built)?;
         }
         let (entries, mut finishes) = self.entries(scene, camera, settings, callback)?;
-        memory::check_all(View::new(built, camera), entries.iter().map(|entry| &entry.settings))?;
+        let denoisers = self.runs.iter().map(|run| (!run.options.no_finish).then_some(run.options.finish.denoise));
+        memory::check_all(View::new(built, camera), entries.iter().map(|entry| &entry.settings).zip(denoisers))?;
         let reference = reference.unwrap_or_else(|| self.render_reference(own, View::new(built, camera), callback));
         let SettingsRequest { seed, iterations, .. } = self.common.settings;
         let rules = Rules {
