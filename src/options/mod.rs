@@ -2,7 +2,7 @@
 //! USD make of it. Those of the method are [`SettingsRequest`](crate::render::SettingsRequest).
 //!
 //! The command line parses these types. Python's keyword arguments are turned into command-line arguments and parsed by
-//! [`parse`]. [`catalogue`] describes the options for generated files: the add-on's panel, the options in a USD stage,
+//! [`parse()`]. [`catalogue`] describes the options for generated files: the add-on's panel, the options in a USD stage,
 //! stubs and tables.
 
 pub mod catalogue;

@@ -1,4 +1,4 @@
-//! Light transport: the bounce loop ([`walk`]), and the visitors that make algorithms of it.
+//! Light transport: the bounce loop ([`walk()`]), and the visitors that make algorithms of it.
 
 pub mod bidirectional;
 mod gather;
