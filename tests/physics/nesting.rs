@@ -124,13 +124,19 @@ fn subpaths_agree_whether_a_solid_exists() {
         ..partial(0.5, 1.5, Some(white))
     };
     let fog = || partial(0.4, 1.0, Some(white));
+    let usual = [(Method::Path, 0.08), (Method::Bdpt, 0.15), (Method::Vcm, 0.15), (Method::Sppm, 0.25)];
+    let others = [Method::Cppm, Method::Appm, Method::Ppm, Method::Mlt].map(|method| (method, 0.3));
+    // Methods that do not render media that scatter.
+    let of_surfaces = [Method::Pm, Method::Bpm].map(|method| (method, 0.3));
     let cases = [
-        ("fog", fog(), false, 4.0),
-        ("wax", wax, false, 4.0),
-        ("ball", fog(), true, 4.0),
-        ("inside", fog(), true, 0.9),
+        ("fog", fog(), false, 4.0, &usual[..], 64),
+        ("wax", wax, false, 4.0, &usual, 64),
+        ("ball", fog(), true, 4.0, &usual, 64),
+        ("inside", fog(), true, 0.9, &usual, 64),
+        ("ball", fog(), true, 4.0, &others, 24),
+        ("clear", partial(0.4, 1.0, None), true, 4.0, &of_surfaces, 24),
     ];
-    for (what, solid, ball, eye) in cases {
+    for (what, solid, ball, eye, methods, iterations) in cases {
         let mut description = Description::default();
         let source = EnvironmentSource::Color(Rgb::ONE);
         description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
@@ -143,23 +149,26 @@ fn subpaths_agree_whether_a_solid_exists() {
         }
         description.cameras.push(look_at(DVec3::new(0.1, 0.2, eye), DVec3::ZERO, 30.0));
         let scene = build(description);
-        for (method, detects) in [(Method::Path, 0.08), (Method::Bdpt, 0.15), (Method::Vcm, 0.15), (Method::Sppm, 0.25)]
-        {
+        for &(method, detects) in methods {
             let settings = |seed| Settings {
                 seed,
-                photons: 4000,
-                initial_bandwidth: InitialBandwidth::Fixed(0.1),
+                // One map has all photons.
+                photons: if method.has_one_map() { 100_000 } else { 4000 },
+                initial_bandwidth: match method.has_one_map() {
+                    true => InitialBandwidth::Nearest(20),
+                    false => InitialBandwidth::Fixed(0.1),
+                },
                 levels: Levels::new(1),
-                iterations: Some(64),
+                iterations: Some(iterations),
                 ..Settings::default()
             };
             let mean = |seed| {
                 let rendered = support::render(&scene, method, 8, &settings(seed));
                 rendered.pixels.iter().map(|p| p.mean(0).x).sum::<f64>() / rendered.pixels.len() as f64
             };
-            let bias = if matches!(method, Method::Path | Method::Bdpt) { 1e-3 } else { 0.02 };
+            let bias = if matches!(method, Method::Path | Method::Bdpt | Method::Mlt) { 1e-3 } else { 0.02 };
             let check = Check { expected: 1.0, bias, detects };
-            check.run(16, &format!("{what}, {method:?}"), &(0..12).map(mean).collect::<Vec<f64>>());
+            check.run(22, &format!("{what}, {method:?}"), &(0..12).map(mean).collect::<Vec<f64>>());
         }
     }
 }
