@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::plan::switch;
 use crate::render::Motion;
 use crate::scene::description::missing_at_moments;
-use crate::scene::gltf::{Moments, MovingFile};
+use crate::scene::gltf::{FileMoments, MovingFile};
 use crate::scene::{CameraRequest, MomentBuilder, Scene, View};
 use crate::stop::Stop;
 
@@ -34,7 +34,7 @@ pub(super) struct MovingScene<'a> {
     /// The scene at the frame itself, for which settings and layers are made.
     at_frame: &'a Scene,
     /// Describes and builds moments of a glTF file; `None` for USD, whose stage is converted at every moment.
-    moments: Option<(Moments<'a>, MomentBuilder<'a>)>,
+    moments: Option<(FileMoments<'a>, MomentBuilder<'a>)>,
     /// Times at which the shutter opens and closes, relative to the frame (frames).
     shutter: [f64; 2],
     stop: Stop,

@@ -18,8 +18,8 @@ pub use initial_bandwidth::{FOOTPRINT_PIXELS, InitialBandwidth, MIN_USER_BANDWID
 pub use input::{Motion, RenderInput};
 pub(crate) use pass::Cost;
 pub use pass::{
-    MAX_TECHNIQUES, Moments, PHOTON_BYTES, PhotonCounts, Proxy, TechniquePicture, WHOLE_TILE, bytes_per_whole_tile,
-    photons_per_path, sample_bytes,
+    MAX_TECHNIQUES, PHOTON_BYTES, PhotonCounts, Proxy, SecondMoments, TechniquePicture, WHOLE_TILE,
+    bytes_per_whole_tile, photons_per_path, sample_bytes,
 };
 pub use session::{Control, ExpectedError, MIN_ITERATIONS_FOR_ERROR, Progress, Session, State, render, run_session};
 pub use settings::{

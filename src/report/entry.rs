@@ -135,15 +135,15 @@ impl Metric {
 
 /// Iteration counts at which pictures are measured: 1, 2, 3, ... in a geometric series, rounded.
 #[derive(Clone, Copy, Debug)]
-pub struct Moments {
+pub struct MeasurementSeries {
     ratio: f64,
     next: u64,
 }
 
-impl Moments {
+impl MeasurementSeries {
     /// A series of iteration counts with a ratio above 1.
-    pub fn new(ratio: f64) -> Moments {
-        Moments { ratio, next: 1 }
+    pub fn new(ratio: f64) -> MeasurementSeries {
+        MeasurementSeries { ratio, next: 1 }
     }
 
     /// Whether the iteration count is in the series; must be called after every iteration.
@@ -162,8 +162,8 @@ mod tests {
 
     #[test]
     fn moments_are_a_geometric_series_without_repetition() {
-        let mut moments = Moments::new(std::f64::consts::SQRT_2);
-        let reached: Vec<u64> = (1..=70).filter(|&n| moments.reached(n)).collect();
+        let mut series = MeasurementSeries::new(std::f64::consts::SQRT_2);
+        let reached: Vec<u64> = (1..=70).filter(|&n| series.reached(n)).collect();
         assert_eq!(reached, [1, 2, 3, 4, 6, 8, 11, 16, 23, 33, 47, 66]);
     }
 }

@@ -1,6 +1,6 @@
 //! The render of one entry with one seed, while it is in progress.
 
-use super::entry::Moments;
+use super::entry::MeasurementSeries;
 use crate::error::Result;
 use crate::film::Picture;
 use crate::finish::{Finish, reads_for_picture};
@@ -24,7 +24,7 @@ pub struct Rules {
 /// The render of one entry, a method with its settings, with one seed.
 pub(super) struct EntryRun<'a> {
     pub(super) session: Session<'a>,
-    pub(super) moments: Moments,
+    pub(super) moments: MeasurementSeries,
     /// Time that every finish of the run's pictures has taken so far.
     pub(super) finish_times: Vec<TimeSpent>,
     /// Iterations at the last measurement of the run.
@@ -36,7 +36,13 @@ pub(super) struct EntryRun<'a> {
 impl<'a> EntryRun<'a> {
     /// A run before its first iteration.
     pub(super) fn new(session: Session<'a>, rules: &Rules) -> EntryRun<'a> {
-        EntryRun { session, moments: Moments::new(rules.ratio), finish_times: Vec::new(), measured: 0, open: true }
+        EntryRun {
+            session,
+            moments: MeasurementSeries::new(rules.ratio),
+            finish_times: Vec::new(),
+            measured: 0,
+            open: true,
+        }
     }
 
     /// Median time of the run's finishes, by wall clock; `None` before the first. The first use of a network takes

@@ -10,7 +10,7 @@ use crate::support::scenes::square;
 use caustique::camera::Camera;
 use caustique::error::Result;
 use caustique::render::{Method, Motion, RenderInput, Rendered, Settings};
-use caustique::scene::gltf::{FrameTime, Moments, MovingFile, ReadOptions, read_bytes};
+use caustique::scene::gltf::{FileMoments, FrameTime, MovingFile, ReadOptions, read_bytes};
 use caustique::scene::{MomentBuilder, Scene};
 use glam::DQuat;
 use glb::Glb;
@@ -33,7 +33,7 @@ fn name() -> &'static Path {
 }
 
 /// The moments of a file.
-struct FileMotion<'a>(Moments<'a>, MomentBuilder<'a>);
+struct FileMotion<'a>(FileMoments<'a>, MomentBuilder<'a>);
 
 impl Motion for FileMotion<'_> {
     fn at(&self, time: f64) -> Result<(Scene, Camera)> {

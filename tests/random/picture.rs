@@ -14,7 +14,7 @@ use caustique::plan::{EffectPlan, Plan, PlanRequest};
 use caustique::render::{
     Control, Levels, Method, Motion, RenderInput, Rendered, Session, Settings, render, run_session,
 };
-use caustique::scene::gltf::{self, FrameTime, Moments, MovingFile, ReadOptions};
+use caustique::scene::gltf::{self, FileMoments, FrameTime, MovingFile, ReadOptions};
 use caustique::scene::{CameraRequest, Crop, Description, MomentBuilder, Scene, light_preset};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::path::Path;
@@ -154,7 +154,7 @@ fn accepted(rendered: Rendered) -> Result<Rendered, String> {
 
 /// The moments of a scene while its shutter is open.
 struct Moving<'a> {
-    moments: Moments<'a>,
+    moments: FileMoments<'a>,
     builder: MomentBuilder<'a>,
     shutter: [f64; 2],
     view: CameraRequest,

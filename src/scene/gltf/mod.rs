@@ -231,24 +231,24 @@ impl MovingFile {
     ///
     /// # Errors
     /// A file that the scene names cannot be read any more.
-    pub fn moments(&self) -> Result<Moments<'_>> {
+    pub fn moments(&self) -> Result<FileMoments<'_>> {
         let mut document = nodes::parse(&self.bytes, &self.path, &self.options, &mut Vec::new())
             .map_err(|e| e.within(self.path.display()))?;
         let tracks = animation::Tracks::read(&document, &self.options, &mut Vec::new())?;
         tracks.apply(&mut document, 0.0, &mut Vec::new())?;
-        Ok(Moments { file: self, moving: tracks.moving_parts(), tracks, document: Mutex::new(document) })
+        Ok(FileMoments { file: self, moving: tracks.moving_parts(), tracks, document: Mutex::new(document) })
     }
 }
 
 /// Describes the moments of a scene file.
-pub struct Moments<'a> {
+pub struct FileMoments<'a> {
     file: &'a MovingFile,
     tracks: animation::Tracks,
     moving: animation::MovingParts,
     document: Mutex<document::Document<'a>>,
 }
 
-impl Moments<'_> {
+impl FileMoments<'_> {
     /// Describes the scene `after_frame` frames after its frame. Meshes that keep their shape are those of `meshes`, the
     /// meshes of the scene that was built from the file, and the description has no materials if they do not change.
     ///

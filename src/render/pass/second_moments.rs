@@ -253,7 +253,7 @@ struct Block {
 }
 
 /// Second moments of all candidates.
-pub struct Moments {
+pub struct SecondMoments {
     blocks: Vec<Block>,
     size: Size,
     iterations: f64,
@@ -340,7 +340,7 @@ impl Proxy<'_> {
 
     /// Renders `iterations` iterations, or fewer, but at least two, once `late` returns true. The result is useless if the
     /// user stops the render ([`Settings::stop`]).
-    pub fn measure(&self, guide: Option<&Guide>, iterations: u64, late: &dyn Fn() -> bool) -> Moments {
+    pub fn measure(&self, guide: Option<&Guide>, iterations: u64, late: &dyn Fn() -> bool) -> SecondMoments {
         let initial_media = InitialMedia::of(self.scene, self.camera);
         let camera_paths = self.settings.camera_paths(self.scene, self.camera, &initial_media);
         let (width, height) = self.camera.size();
@@ -380,7 +380,7 @@ impl Proxy<'_> {
 }
 
 impl Walks<'_, '_> {
-    fn run(&self, iterations: u64, late: &dyn Fn() -> bool) -> Moments {
+    fn run(&self, iterations: u64, late: &dyn Fn() -> bool) -> SecondMoments {
         let none = Block { sums: vec![Sums::default(); self.candidates.len()], ..Block::default() };
         let mut blocks = vec![none; self.blocks.pixels()];
         let mut direct = vec![[Rgb::ZERO; 2]; self.bandwidth2.len()];
@@ -408,7 +408,7 @@ impl Walks<'_, '_> {
             block.direct_variance += f64::from(variance.element_sum().max(0.0) / 3.0);
             block.pixels += 1.0;
         }
-        Moments { blocks, size: self.blocks, iterations: f64::from(n), candidates: self.candidates.clone() }
+        SecondMoments { blocks, size: self.blocks, iterations: f64::from(n), candidates: self.candidates.clone() }
     }
 
     /// Adds the sums of an iteration, row by row.
@@ -567,7 +567,7 @@ fn lit_pixel(pixel: usize, value: Rgb) -> Option<(usize, f64)> {
     light.is_finite().then_some((pixel, light))
 }
 
-impl Moments {
+impl SecondMoments {
     /// The variance of an iteration's indirect light for a candidate, summed over the pixels of a block.
     fn indirect_variance(&self, block: &Block, candidate: usize) -> f64 {
         block.pixels * block.sums[candidate].variance(block.pixels * self.iterations, &self.candidates[candidate])
