@@ -38,7 +38,7 @@ impl Summary {
             light_paths: rendered.stats.light_paths,
             seconds: rendered.stats.time.seconds,
             phases: format!(
-                "core-seconds: pilot {:.1}, light {:.1}, map {:.1}, eye {:.1}",
+                "core-seconds: pilot {:.1}, light paths {:.1}, photon map {:.1}, camera paths {:.1}",
                 p.pilot, p.light, p.map, p.eye
             ),
             error: rendered.error.relative(),
