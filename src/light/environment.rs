@@ -32,6 +32,9 @@ pub struct EnvironmentSample {
 const SHARES: usize = 8;
 /// Share of the cosine under a uniform sky, the largest.
 const UNIFORM_SHARE: f32 = (SHARES - 1) as f32 / SHARES as f32;
+/// Largest ratio of variances for which an image is sampled by the cosine at all. The variances are those of independent
+/// samples. Stratified ones lose by a choice between two densities: at a predicted ratio of 0.76, variance rose 1.4 times.
+const MAX_VARIANCE_RATIO: f64 = 0.5;
 /// Directions of an image by which its share is chosen.
 const SHARE_SAMPLES: u32 = 1024;
 /// Number of patches in a strip.
@@ -215,25 +218,35 @@ impl ImageEnvironment {
         Some(ImageEnvironment { cosine: image.best_share(), ..image })
     }
 
-    /// The share of the cosine with the least second moment of unoccluded light on white surfaces, in the mean over
-    /// normals.
+    /// The share of the cosine with the least variance of unoccluded light on white surfaces, in the mean over normals,
+    /// where bounces, which follow the cosine, find the light as well and both are weighed by the balance heuristic:
+    /// `int f^2 / (p + q) - (int f p / (p + q))^2 - (int f q / (p + q))^2` for the densities p and q.
     fn best_share(&self) -> f32 {
         let normals = (0..27).map(|i| Vec3::new((i % 3) as f32, (i / 3 % 3) as f32, (i / 9) as f32) - 1.0);
         let normals: Vec<Vec3> = normals.filter_map(Vec3::try_normalize).collect();
-        let mut moments = [0.0; SHARES];
+        // Integrals by normal and share.
+        let mut integrals = vec![[[0.0; 3]; SHARES]; normals.len()];
         for i in 0..SHARE_SAMPLES {
             let u = Vec2::new((i as f32 + 0.5) / SHARE_SAMPLES as f32, i.reverse_bits() as f32 * 0.5f32.powi(32));
             let Some(EnvironmentSample { wi, pdf_w, radiance }) = self.sample(u) else { continue };
-            let squared = f64::from(luminance(radiance)).powi(2) / f64::from(pdf_w);
-            for cos in normals.iter().map(|n| wi.dot(*n)).filter(|cos| *cos > 0.0) {
-                for (share, moment) in moments.iter_mut().enumerate() {
-                    let density = lerp(pdf_w, cos * FRAC_1_PI, share as f32 / SHARES as f32);
-                    *moment += squared * f64::from(cos * cos / density);
+            for (n, of_normal) in normals.iter().zip(&mut integrals) {
+                let bounce = wi.dot(*n).max(0.0) * FRAC_1_PI;
+                let light = luminance(radiance) * bounce;
+                for (share, [squares, by_light, by_bounce]) in of_normal.iter_mut().enumerate() {
+                    let density = lerp(pdf_w, bounce, share as f32 / SHARES as f32);
+                    let both = f64::from(density + bounce) * f64::from(pdf_w) * f64::from(SHARE_SAMPLES);
+                    *squares += f64::from(light).powi(2) / both;
+                    *by_light += f64::from(light * density) / both;
+                    *by_bounce += f64::from(light * bounce) / both;
                 }
             }
         }
-        let best = (0..SHARES).min_by(|&a, &b| moments[a].total_cmp(&moments[b]));
-        best.unwrap_or_default() as f32 / SHARES as f32
+        let variance = |share: usize| -> f64 {
+            integrals.iter().map(|of_normal| of_normal[share]).map(|[s, p, q]| s - p * p - q * q).sum()
+        };
+        let best = (0..SHARES).min_by(|&a, &b| variance(a).total_cmp(&variance(b))).unwrap_or_default();
+        let pays = variance(best) < MAX_VARIANCE_RATIO * variance(0);
+        if pays { best as f32 / SHARES as f32 } else { 0.0 }
     }
 
     #[inline]
