@@ -104,6 +104,9 @@ class Sources(unittest.TestCase):
         files = [support.ROOT / name for name in listed.stdout.splitlines()]
         self.assertLess(sum(file.stat().st_size for file in files if file.exists()), 8e6)
         self.assertIn(support.ROOT / "examples" / "picture.rs", files)
+        for source in (support.ROOT / "src").rglob("*.rs"):
+            for name in re.findall(r'include_(?:str|bytes)!\(\s*"([^"]+)"', source.read_text(encoding="utf-8")):
+                self.assertIn((source.parent / name).resolve(), files, source)
 
     def test_all_files_state_one_version(self):
         def text(name):
