@@ -13,7 +13,8 @@ import support
 SCRIPTS = support.ROOT / "scripts"
 #: Scripts that Blender or an isolated Python (-I) starts without their folder on the search path.
 STARTED_ELSEWHERE = {
-    "blender/export_blend.py", "blender/build.py",
+    "blender/export_blend.py",
+    "blender/build.py",
     "blender/caustique_addon/export_job.py",
     "blender/export.py",
     "usd/convert.py",
