@@ -5,6 +5,7 @@ use crate::film::{Layer, LayerSet, Naming, Selection};
 use crate::finish::DenoiserChoice;
 use crate::image::exr::{self, Attributes};
 use crate::image::{png, tonemap::Look};
+use crate::pipeline::finish::missing_denoiser;
 use crate::pipeline::load::{self, Loaded, SceneRequest};
 use crate::pipeline::shard::ShardSums;
 use crate::pipeline::{self, Delivery, Event, FinishRequest, Observer, PictureRequest, Request};
@@ -203,7 +204,7 @@ impl Observer for Reports<'_> {
     fn event(&mut self, event: Event<'_>) {
         match event {
             Event::FinishOpened { missing: Some(error) } => {
-                self.warnings.push(format!("{error}: our own denoiser takes its place"));
+                self.warnings.push(missing_denoiser(error));
             }
             Event::Begins { plan, .. } => self.warnings.extend(plan.warnings.iter().cloned()),
             Event::Warning(warning) => self.warnings.push(warning.into()),

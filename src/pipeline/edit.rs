@@ -3,7 +3,7 @@
 use super::load::{self, Loaded, SceneRequest};
 use crate::error::{Error, ErrorKind, Result};
 use crate::math::DAffine3;
-use crate::scene::{Description, blend, gltf, usd};
+use crate::scene::Description;
 use crate::stop::Stop;
 use std::path::PathBuf;
 
@@ -73,12 +73,7 @@ impl EditableScene {
                 Edit::Place(name, to_world) => description.place(name, *to_world)?,
                 Edit::Remove(name) => description.remove(name)?,
                 Edit::Replace(path) => {
-                    let options = &self.request.options;
-                    let mut part = match path {
-                        path if usd::is_stage(path) => usd::read(path, options, 0.0, stop)?,
-                        path if blend::is_blend(path) => blend::read(path, options, stop)?.0,
-                        path => gltf::read(path, options)?,
-                    };
+                    let (mut part, _) = load::read_file(path, &self.request.options, stop)?;
                     warnings.append(&mut part.warnings);
                     description.replace_by(part);
                 }

@@ -24,6 +24,12 @@ pub struct FinishRequest {
     pub model: Option<String>,
 }
 
+/// Text of the warning that the built-in denoiser replaces a missing one.
+pub fn missing_denoiser(error: &Error) -> String {
+    let hint = error.hint.as_ref().map(|hint| format!("; {hint}")).unwrap_or_default();
+    format!("{error}: our own denoiser takes its place, whose pictures are grainier{hint}")
+}
+
 /// A finish (denoiser and network) whose libraries have been found and whose network has been loaded.
 pub struct OpenFinish {
     finish: Finish,

@@ -8,7 +8,7 @@ use crate::plan::switch::{self, Removed};
 use crate::scene::description::{Description, EnvironmentDescription, EnvironmentSource};
 use crate::scene::{LightPreset, Scene, blend, environment_file, gltf, light_preset, usd};
 use crate::stop::Stop;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Bytes kept free for Embree's library, and for each of its threads: Embree ends the process if they get none. Bounds
 /// found by lowering `ulimit -v` (`no_limit_of_memory_aborts` in `tests/cli/limits.rs`).
@@ -80,13 +80,25 @@ pub(super) fn read(
     stop: &Stop,
 ) -> Result<(Description, Option<gltf::MovingFile>)> {
     check_memory(request, threads)?;
-    if usd::is_stage(&request.path) {
-        return Ok((usd::read(&request.path, &request.options, 0.0, stop)?, None));
+    read_file(&request.path, &request.options, stop)
+}
+
+/// Reads the description of a scene file of any format, and the file of its moments.
+///
+/// # Errors
+/// The file, or a file that it names, is malformed; `stop` is set.
+pub(super) fn read_file(
+    path: &Path,
+    options: &gltf::ReadOptions,
+    stop: &Stop,
+) -> Result<(Description, Option<gltf::MovingFile>)> {
+    if usd::is_stage(path) {
+        Ok((usd::read(path, options, 0.0, stop)?, None))
+    } else if blend::is_blend(path) {
+        blend::read(path, options, stop)
+    } else {
+        gltf::MovingFile::open(path, options)
     }
-    if blend::is_blend(&request.path) {
-        return blend::read(&request.path, &request.options, stop);
-    }
-    gltf::MovingFile::open(&request.path, &request.options)
 }
 
 /// Reads and builds the scene of a USD stage as it is `after_frame` frames after the frame of the request.

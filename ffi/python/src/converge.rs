@@ -275,7 +275,7 @@ impl Comparison {
             let request = (!options.no_finish).then(|| options.finish.request());
             let opened = request.map(|request| finish::open(&request, Some(settings.levels.count))).transpose()?;
             let missing = opened.as_ref().and_then(|finish| finish.missing.as_ref());
-            warnings.extend(missing.map(options::missing_denoiser));
+            warnings.extend(missing.map(finish::missing_denoiser));
             let settings = Settings { iterations: None, time: None, ..settings };
             let finish = opened.as_ref().map(OpenFinish::name);
             entries.push(Entry { name: name.clone(), options: String::new(), settings, decided, finish });

@@ -2,12 +2,13 @@
 
 use crate::error::raised;
 use crate::image::Image;
-use crate::options::{finish_request, missing_denoiser};
+use crate::options::finish_request;
 use crate::work::{Caller, work};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::take_plain_names;
 use caustique::image::exr::ATTRIBUTE;
 use caustique::options::{files_of_frames, no_frames};
+use caustique::pipeline::finish::missing_denoiser;
 use caustique::pipeline::finish::open;
 use caustique::pipeline::temporal::FrameFiles;
 use caustique::pipeline::{FinishRequest, OpenFinish, RenderedFile, write_finish};

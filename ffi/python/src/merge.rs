@@ -2,13 +2,13 @@
 
 use crate::error::raised;
 use crate::image::Image;
-use crate::options::{self, finish_request};
+use crate::options::finish_request;
 use crate::scene::delivered;
 use crate::work::work;
 use caustique::error::{Error, Result};
 use caustique::film::{Naming, Selection, take_plain_names};
 use caustique::image::exr;
-use caustique::pipeline::finish::open;
+use caustique::pipeline::finish::{missing_denoiser, open};
 use caustique::pipeline::merge::{MergeEvent, MergeRequest, Shards, is_shard};
 use caustique::pipeline::seeds::Seeds;
 use caustique::pipeline::{FinishRequest, write_finish};
@@ -60,7 +60,7 @@ pub fn merge(
     };
     let done = work(py, threads, |caller| {
         caller.warn(&shards.warnings());
-        let missing = |error: &Error| caller.warn(&[options::missing_denoiser(error)]);
+        let missing = |error: &Error| caller.warn(&[missing_denoiser(error)]);
         shards.merge(&request, |event| {
             if let MergeEvent::Finishing { missing: Some(error), .. } = event {
                 missing(error);
@@ -96,7 +96,7 @@ fn average(
     let done = work(py, threads, |caller| {
         if let Some(request) = request {
             let mut opened = open(&request, None)?;
-            caller.warn(&opened.missing.iter().map(options::missing_denoiser).collect::<Vec<_>>());
+            caller.warn(&opened.missing.iter().map(missing_denoiser).collect::<Vec<_>>());
             let account = opened.finish().apply(&mut set, |_| true)?;
             write_finish(&mut header, &opened, &account);
         }

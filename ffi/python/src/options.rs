@@ -3,7 +3,6 @@
 
 use crate::error::usage;
 use crate::keywords::{Keywords, choice};
-use caustique::error::Error;
 use caustique::options::catalogue::{OptionDescription, ValueKind, of_python, of_scene};
 use caustique::options::{FrameSeed, InvalidOption, RenderOptions, RunOptions, SceneOptions, parse};
 use caustique::pipeline::FinishRequest;
@@ -43,12 +42,6 @@ fn chosen(wanted: impl Fn(&OptionDescription) -> bool) -> Vec<OptionDescription>
 /// The finish of a render, by the arguments `denoise` and `model` of `call`.
 pub fn finish_request(call: &str, denoise: &str, model: Option<String>) -> PyResult<FinishRequest> {
     Ok(FinishRequest { denoiser: choice(&format!("{call}: denoise"), denoise)?, model })
-}
-
-/// Text of the warning that the built-in denoiser replaces a missing one.
-pub fn missing_denoiser(error: &Error) -> String {
-    let hint = error.hint.as_ref().map(|hint| format!("; {hint}")).unwrap_or_default();
-    format!("{error}: our own denoiser takes its place, whose pictures are grainier{hint}")
 }
 
 /// Takes the options of a render from the keyword arguments.

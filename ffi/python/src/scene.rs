@@ -13,6 +13,7 @@ use caustique::files;
 use caustique::film::Naming;
 use caustique::image::{Outputs, atomic};
 use caustique::options::SceneOptions;
+use caustique::pipeline::finish::missing_denoiser;
 use caustique::pipeline::load::{Environment, load, load_bytes};
 use caustique::pipeline::plan::plan_picture;
 use caustique::pipeline::{
@@ -354,7 +355,7 @@ impl Observer for CallerReports<'_> {
     fn event(&mut self, event: Event<'_>) {
         match event {
             Event::FinishOpened { missing } => {
-                self.caller.warn(&missing.map(options::missing_denoiser).into_iter().collect::<Vec<_>>());
+                self.caller.warn(&missing.map(missing_denoiser).into_iter().collect::<Vec<_>>());
             }
             Event::Begins { plan, .. } => self.caller.warn(&plan.warnings),
             Event::Progress(progress) => self.call_back(progress),
