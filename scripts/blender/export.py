@@ -56,6 +56,9 @@ import world
 # Angle between the shading normal and the face, and the share of a mesh's area, above which the picture differs visibly
 # from Cycles, which softens such normals.
 _LEANING_DEGREES, _MAX_LEANING_SHARE = 25, 0.02
+# The same angles for normals of the object's own, which may all lean one way, on glass and on polished surfaces.
+_OWN_LEANING_DEGREES = {"glass": 10, "polished": 17}
+_POLISHED = 0.6  # roughness below which a mirror image shows
 
 
 def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None, only=None):
@@ -92,6 +95,7 @@ def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None, onl
         _open_scene(flat.scene, undo)
         bpy.context.view_layer.update()
         camera_export.add_cameras(flat, warn)
+        polished = _polished(flat.things)  # of the artist's materials, which stand-ins replace now
         worn = surfaces.Surfaces(flat, _materials_of(flat.things), undo, warn, bake_size, progress)
         lighting.warn_of_soft_falloff(flat, warn)
         lighting.add_lamps(flat, warn)
@@ -99,7 +103,7 @@ def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None, onl
             environment = said["environment"]
             sky.add_sun(sun, flat, ["camera"] if "visible" in environment else [], environment.get("light_group"))
         bodies = _solidity(flat.things)
-        _warn_of_leaning_normals(flat, warn)
+        _warn_of_leaning_normals(flat, polished, warn)
         guard.attempt(warn, f'scene "{scene.name}"', None, "a camera within glass is not named",
                       _warn_of_immersed_camera, flat, bodies, warn)
         bpy.context.view_layer.update()
@@ -228,20 +232,41 @@ def _solidity(things):
     return bodies
 
 
-def _warn_of_leaning_normals(flat, warn):
-    """Warn of meshes whose shading normals lean far from their faces."""
-    shares = {}
+def _warn_of_leaning_normals(flat, polished, warn):
+    """Warn of meshes whose shading normals lean far from their faces. `polished`: names of objects."""
+    seen = set()
     for thing in flat.things:
-        if thing.type != "MESH" or thing.data in shares:
+        if thing.type != "MESH" or thing.data in seen:
             continue
-        share = shares[thing.data] = guard.attempt(warn, flat.where(thing), 0.0, "its normals are not checked",
-                                                   _leaning_share, thing.data)
-        if share <= _MAX_LEANING_SHARE:
-            continue
-        glass = any(slot.material and may_transmit(slot.material) for slot in thing.material_slots)
-        warn(flat.where(thing), f"its smooth shading leans by more than {_LEANING_DEGREES} degrees from its faces on "
-             f"{share:.0%} of its area: there it is {'darker' if glass else 'brighter or darker'} than in Cycles; mark "
-             "these edges sharp, or bevel them with more segments")
+        seen.add(thing.data)
+        guard.attempt(warn, flat.where(thing), None, "its normals are not checked", _warn_of_leaning, thing, flat,
+                      thing.name in polished, warn)
+
+
+def _warn_of_leaning(thing, flat, polished, warn):
+    glass = any(slot.material and may_transmit(slot.material) for slot in thing.material_slots)
+    own, kind = thing.data.has_custom_normals, "glass" if glass else "polished" if polished else "matt"
+    limit = _OWN_LEANING_DEGREES.get(kind, _LEANING_DEGREES) if own else _LEANING_DEGREES
+    share = _leaning_share(thing.data, limit)
+    if share > _MAX_LEANING_SHARE:
+        remedy = ("clear its own normals (Object Data > Geometry Data > Clear Custom Split Normals Data), or model the shape "
+                  "that they pretend" if own else "mark these edges sharp, or bevel them with more segments")
+        warn(flat.where(thing), f"its smooth shading leans by more than {limit} degrees from its faces on {share:.0%} of its "
+             f"area: there it is {'darker' if glass else 'brighter or darker'} than in Cycles; {remedy}")
+
+
+def _polished(things):
+    """Names of the objects with a polished material."""
+    return {thing.name for thing in things if any(m is not None and _is_polished(m) for m in surfaces.materials_of(thing))}
+
+
+def _is_polished(material):
+    """Whether the highlights of a material are sharp enough to show where its normals point."""
+    output = shading.output_of(shading.nodes_of(material))
+    parts = shading.leaves(shading.source(output.inputs["Surface"])) if output is not None else []
+    roughness = [shading.constant(part.inputs["Roughness"], 0.0) for part in parts
+                 if part.type not in {"BSDF_DIFFUSE", "DIFFUSE_BSDF"} and "Roughness" in part.inputs]
+    return any(value < _POLISHED for value in roughness)
 
 
 def _warn_of_immersed_camera(flat, bodies, warn):
@@ -268,8 +293,8 @@ def _warn_of_refused_drivers(scene, warn):
              "drives keeps its last value: use a simple expression, or bake the values to keyframes")
 
 
-def _leaning_share(mesh):
-    """The share of a mesh's area at whose corners the shading normal leans far from the face."""
+def _leaning_share(mesh, degrees):
+    """The share of a mesh's area at whose corners the shading normal leans by more than `degrees` from the face."""
     count = len(mesh.polygons)
     corners, faces = numpy.empty(len(mesh.loops) * 3, numpy.float32), numpy.empty(count * 3, numpy.float32)
     areas, totals = numpy.empty(count, numpy.float32), numpy.empty(count, numpy.int32)
@@ -278,7 +303,7 @@ def _leaning_share(mesh):
         mesh.polygons.foreach_get(name, values)
     cosines = (corners.reshape(-1, 3) * numpy.repeat(faces.reshape(-1, 3), totals, axis=0)).sum(1)
     weights = numpy.repeat(areas / totals, totals)
-    return float(weights[cosines < math.cos(math.radians(_LEANING_DEGREES))].sum() / max(weights.sum(), 1e-30))
+    return float(weights[cosines < math.cos(math.radians(degrees))].sum() / max(weights.sum(), 1e-30))
 
 
 def may_transmit(material):

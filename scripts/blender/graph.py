@@ -95,6 +95,9 @@ class Graph:
         self.output = output_of(self.tree) or self.tree.nodes.new("ShaderNodeOutputMaterial")
         self._lifted = {}
         self._own_groups(self.tree, undo)
+        # Image textures whose Alpha the surface uses, before the surface is replaced for baking.
+        self._with_alpha = {node.as_pointer(): node for node, output in upstream(self.output.inputs["Surface"]).values()
+                            if node.type == "TEX_IMAGE" and output.name == "Alpha"}
 
     def _own_groups(self, tree, undo):
         for node in tree.nodes:
@@ -112,6 +115,26 @@ class Graph:
                 if node.type == "GROUP" and node.node_tree is not None:
                     yield from below(node.node_tree)
         return list(below(self.tree))
+
+    def keep_alpha(self):
+        """Keep the Alpha of image textures in use where Color is read alone: Cycles divides Color by Alpha if, and only
+        if, the material uses both.
+
+        Returns {output socket: the socket that replaces it}, for values that are not linked yet.
+        """
+        made = {}
+        for node in self._with_alpha.values():
+            tree, colour = node.id_data, node.outputs["Color"]
+            one, kept = tree.nodes.new("ShaderNodeMath"), tree.nodes.new("ShaderNodeVectorMath")
+            one.operation, one.inputs[1].default_value, kept.operation = "GREATER_THAN", -1.0, "SCALE"
+            links = [link.to_socket for link in colour.links]
+            tree.links.new(node.outputs["Alpha"], one.inputs[0])
+            tree.links.new(colour, kept.inputs["Vector"])
+            tree.links.new(one.outputs[0], kept.inputs["Scale"])
+            for socket in links:
+                tree.links.new(kept.outputs["Vector"], socket)
+            made[colour] = kept.outputs["Vector"]
+        return made
 
     def value(self, socket, path=()):
         """The value of an input socket at any group depth."""

@@ -160,8 +160,10 @@ class Reader:
         if leaf.type == "BSDF_GLASS":  # Cycles also tints its reflection
             lobe.specular = self.graph.minimum(self.graph.max_component(colour), 1.0)
             lobe.specular_colour = self.graph.divide(colour, self.graph.maximum(lobe.specular, 1e-6))
-            if is_constant(colour) and max(colour) - min(colour) > 0.25:
-                self.say("the tint of its Glass shader's reflections is carried at steep angles only")
+            if is_constant(colour) and min(colour) < 0.7:
+                self.say("the tint of its Glass shader's reflections is carried at steep angles only: its rim is brighter "
+                         "than in Cycles; tint a Principled BSDF with Transmission instead, whose reflections are white in "
+                         "both")
         self._distribution(leaf, lobe)
         self._film(leaf, lobe)
         return lobe
@@ -320,6 +322,10 @@ class Reader:
     def _coverings(self, leaf, lobe):
         g = self.graph
         if lobe.coat != 0.0:
+            if lobe.transmission != 0.0:
+                self.say("its coat over glass dims light by the directions of light and view alike, in Cycles by that of the "
+                         "view alone: it is a few per cent darker here; set Coat > Weight to 0, because glass has "
+                         "reflections of its own")
             lobe.coat_ior, lobe.coat_colour = g.maximum(self.get(leaf, "Coat IOR"), 1.0), self.get(leaf, "Coat Tint")
             if lobe.coat_colour != WHITE:
                 # Cycles applies the whole tint to emission, glTF's reader that of one passage: 1.146 / 2 on average.

@@ -40,10 +40,14 @@ _UNBAKED_DEFAULTS = {  # values of varying quantities if nothing may be baked
 _MEANS = ("ior", "film_ior")  # quantities that have no texture
 _MIN_ROUGH_METAL = 0.05  # share of texels that is worth a warning
 _STEEP_COSINE, _OLD_STEEP_COSINE = 0.75, 0.97  # between the shading and the surface normal; the latter before Blender 4.5
+_GLASS_STEEP_COSINE = 0.955  # the same of glass
 _MIN_STEEP = 0.01  # share of texels that is worth a warning
 _STEEP_WARNING = (
     "its normals lean by more than 40 degrees from the surface: its shine is brighter there than in Cycles, "
     "which loses part of it; use a Displace modifier for relief that steep")
+_GLASS_STEEP_WARNING = (
+    "its normals lean by more than 17 degrees from the surface: its glass is a few per cent brighter there than in Cycles, "
+    "which loses light at such normals; use a Displace modifier for relief that steep, or a weaker map")
 _OLD_STEEP_WARNING = (
     "its normals lean by more than 14 degrees from the surface: Cycles of this version of Blender turns them towards the "
     "viewer, which Blender 4.5 and caustique do not; use a Displace modifier to see the same in both")
@@ -104,7 +108,7 @@ class Plan:
         if self.passes:
             if any(n.type == "AMBIENT_OCCLUSION" and not n.only_local for t in self.graph.trees() for n in t.nodes):
                 self.say("its Ambient Occlusion node sees the object alone, without what stands around it")
-            made = standin.read_coordinates(self.graph)
+            made = standin.read_coordinates(self.graph) | self.graph.keep_alpha()
             self.passes = {name: value if value is None or is_constant(value) else made.get(value, value)
                            for name, value in self.passes.items()}
             self.of_object = standin.depends_on_object(self.graph)
@@ -256,6 +260,8 @@ class Plan:
             self.say(_OLD_BUMP_WARNING)
         if numpy.mean(cosines < _STEEP_COSINE) > _MIN_STEEP:
             self.say(_STEEP_WARNING)
+        elif self.matched.transmission != 0.0 and numpy.mean(cosines < _GLASS_STEEP_COSINE) > _MIN_STEEP:
+            self.say(_GLASS_STEEP_WARNING)
         elif bpy.app.version < (4, 5, 0) and numpy.mean(cosines < _OLD_STEEP_COSINE) > _MIN_STEEP:
             self.say(_OLD_STEEP_WARNING)
 

@@ -206,6 +206,27 @@ class Lamps(cycles_comparison.CyclesComparison):
                 self.assertEqual(self.warnings, [])
                 bpy.data.objects.remove(body)
 
+    def test_profiles_of_coarse_angles(self):
+        """Between measured angles Cycles' cubics are (9 (b + c) - a - d) / 16 in the middle; before Blender 5.0 it
+        continues them by zero. A profile of another type stays as it is."""
+        import lamp_profiles
+        text = "\n".join(["IESNA:LM-63-2002", "TILT=NONE", "1 1000 2 4 1 {} 2 0 0 0", "1 1 100", "0 30 60 90", "0",
+                          "100 80 30 10"]) + "\n"
+        plain = text.format(2).encode()
+        self.assertEqual(lamp_profiles._smoothed(plain), plain)
+        lines = [line.split() for line in lamp_profiles._smoothed(text.format(1).encode()).decode().splitlines()]
+        up, first = numpy.array(lines[4], float), numpy.array(lines[6], float)
+        numpy.testing.assert_allclose(numpy.interp([0, 30, 60, 90], up, first), [200, 160, 60, 20], rtol=1e-5)
+        beyond = 20 if bpy.app.version >= (5, 0) else 0
+        middles = [(9 * (200 + 160) - 160 - 60) / 16, (9 * (160 + 60) - 200 - 20) / 16,
+                   (9 * (60 + 20) - 160 - beyond) / 16]
+        numpy.testing.assert_allclose(numpy.interp([15, 45, 75], up, first), middles, rtol=1e-5)
+        # One horizontal angle is brighter by up to an eighth opposite to it in Cycles before Blender 5.0.
+        around = [float(x) for x in lines[5]]
+        self.assertEqual(len(around) == 1, bpy.app.version >= (5, 0))
+        if len(around) > 1:
+            self.assertAlmostEqual(float(lines[6 + around.index(180)][0]) / 200, 9 / 8, places=5)
+
     def slide(self):
         """A picture without symmetry."""
         image = bpy.data.images.new("slide", 64, 48)

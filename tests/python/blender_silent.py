@@ -201,6 +201,41 @@ class Named(cycles_comparison.CyclesComparison):
         body.data.materials[0] = self.floor().data.materials[0]
         self.named("brighter or darker than in Cycles")
 
+    def test_glass_that_differs_from_cycles(self):
+        """Coats and dark tints of glass, and normal maps whose lean of 17 degrees is exceeded."""
+        principled = {"Transmission Weight": 1.0, "Roughness": 0.0}
+        for kind, inputs, line in (
+                ("Principled", {**principled, "Coat Weight": 0.5}, "set Coat > Weight to 0"),
+                ("Principled", principled, None),
+                ("Glass", {"Color": (0.5, 0.5, 0.5, 1)}, "its rim is brighter than in Cycles; tint a Principled BSDF"),
+                ("Glass", {"Color": (0.8, 0.9, 0.9, 1)}, None)):
+            material = shared.node_material("glass", f"ShaderNodeBsdf{kind}", **{
+                name.replace(" ", "_"): value for name, value in inputs.items()})
+            body = shared.cube(material)
+            warnings = "".join(export.write(self.path))
+            self.assertIn(line or "", warnings)
+            self.assertEqual(bool(line), bool(warnings), warnings)
+            bpy.data.objects.remove(body)
+
+    def test_normals_of_an_objects_own(self):
+        """Normals that lean one way by 13 degrees darken glass; a polished surface shows 20 degrees, a matt one none."""
+        bpy.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32)
+        body = bpy.context.object
+        mesh = body.data
+        mesh.shade_smooth()
+        smooth = [corner.vector.copy() for corner in mesh.corner_normals]
+        for degrees, kind, inputs, line in (
+                (13, "Glass", {}, "by more than 10 degrees"), (3, "Glass", {}, None),
+                (20, "Principled", {"Roughness": 0.1}, "by more than 17 degrees"),
+                (20, "Principled", {"Roughness": 0.8}, None), (20, "Diffuse", {}, None)):
+            lean = math.tan(math.radians(degrees))
+            mesh.normals_split_custom_set([(n + lean * n.orthogonal().normalized()).normalized() for n in smooth])
+            mesh.materials.clear()
+            mesh.materials.append(shared.node_material("tested", f"ShaderNodeBsdf{kind}", **inputs))
+            warnings = "".join(export.write(self.path))
+            self.assertEqual("Clear Custom Split Normals Data" in warnings, bool(line), warnings)
+            self.assertIn(line or "", warnings)
+
     def test_indices_below_one(self):
         shared.place("wall", square(shared.node_material("tested", "ShaderNodeBsdfPrincipled", IOR=0.0), 1.0))
         self.named("its IOR of 0 is below 1")

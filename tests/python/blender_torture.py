@@ -17,10 +17,11 @@ from lab.figures import torture
 
 SHORT = (
     "principled_coat", "principled_glass_tinted", "image_alpha", "noise_roughness", "image_box", "bump",
-    "group_of_textures", "diffuse_glossy_fresnel", "transparent_mask", "principled_mask",
+    "group_of_textures", "diffuse_glossy_fresnel", "transparent_mask", "principled_mask", "leaves_clipped", "lamp_ies_uneven",
 )
-# In other versions of Blender than 4.5: inputs of Principled, images, baking by Cycles, and bumps differ by version.
-OTHER_VERSIONS = ("principled_coat", "image_alpha", "noise_roughness", "bump")
+# In other versions of Blender than 4.5: inputs of Principled, images, baking by Cycles, bumps and IES profiles differ by
+# version.
+OTHER_VERSIONS = ("principled_coat", "image_alpha", "noise_roughness", "bump", "lamp_ies_uneven")
 # Cycles before Blender 4.5 turns leaning normals towards the viewer, and before 4.4 it smooths bumps: warnings say so.
 WARNED_BEFORE_4_5 = {
     "bump_mirror", "normal_map", "normal_map_weak", "normal_map_scaled", "normal_map_other_uv", "bump_over_normal_map",

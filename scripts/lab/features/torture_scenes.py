@@ -69,8 +69,8 @@ def point_size(stage):
     _lamp(stage, "POINT", 150, (-1.5, -1.5, 2.5), shadow_soft_size=0.2, use_soft_falloff=False)
 
 
-@feature
-def lamp_ies(stage):
+def _profile(stage, text):
+    """A point lamp that shines with an IES profile alone in a dim world."""
     lamp = _lamp(stage, "POINT", 150, (-1.5, -1.5, 2.5), shadow_soft_size=0.05)
     if bpy.app.version < (5, 1, 0):
         lamp.use_nodes = True
@@ -78,11 +78,40 @@ def lamp_ies(stage):
     tree.nodes.clear()
     profile, emission, output = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("TexIES", "Emission", "OutputLight"))
     profile.ies = bpy.data.texts.new("profile")
-    profile.ies.write(
-        "IESNA:LM-63-2002\nTILT=NONE\n1 1000 1 5 1 1 2 0 0 0 1 1 100\n0 30 60 90 180\n0\n1000 800 300 10 0\n"
-    )
+    profile.ies.write(text)
     tree.links.new(profile.outputs[0], emission.inputs["Strength"])
     tree.links.new(emission.outputs[0], output.inputs[0])
+
+
+@feature
+def lamp_ies(stage):
+    _profile(
+        stage, "IESNA:LM-63-2002\nTILT=NONE\n1 1000 1 5 1 1 2 0 0 0 1 1 100\n0 30 60 90 180\n0\n1000 800 300 10 0\n"
+    )
+
+
+@feature
+def lamp_ies_uneven(stage):
+    """A narrow beam, measured at uneven angles."""
+    _profile(
+        stage,
+        "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 7 1 1 2 0 0 0 1 1 100\n"
+        "0 5 10 12.5 30 60 90\n0\n1000 2000 1500 100 50 5 0\n",
+    )
+    stage.background.inputs["Strength"].default_value = 0.05
+    bpy.data.objects.remove(stage.lamp)
+
+
+@feature
+def lamp_ies_turned(stage):
+    """A profile that is mirrored at a plane."""
+    _profile(
+        stage,
+        "IESNA:LM-63-2002\nTILT=NONE\n1 1000 1 4 3 1 2 0 0 0 1 1 100\n"
+        "0 30 60 90\n0 90 180\n1000 800 300 10\n1000 400 100 10\n1000 200 10 5\n",
+    )
+    stage.background.inputs["Strength"].default_value = 0.05
+    bpy.data.objects.remove(stage.lamp)
 
 
 @feature
