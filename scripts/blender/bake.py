@@ -8,6 +8,7 @@ import contextlib
 import bpy
 import numpy
 
+import attributes
 import bake_cache
 import standin
 from graph import is_constant
@@ -25,7 +26,7 @@ class Baker:
     def __init__(self, size, undo):
         scene = bpy.context.scene
         self.size, self.undo, self.frame = size, undo, (scene.frame_current, scene.frame_subframe)
-        self._made = None
+        self._made, self._attributes = None, attributes.numbers_of(scene)
 
     @property
     def stage(self):
@@ -36,6 +37,8 @@ class Baker:
             self._made.render.engine = "CYCLES"
             # Drivers and image sequences are baked at the frame of the export.
             self._made.frame_set(self.frame[0], subframe=self.frame[1])
+            for name, value in self._attributes.items():
+                self._made[name] = value
             self._made.cycles.device = "CPU"
             self._made.cycles.use_denoising = False
             self._made.cycles.use_adaptive_sampling = False
@@ -91,7 +94,7 @@ class Baker:
         return bake_cache.nodes_key(graph.tree, self.frame, material.pass_index,
                                     getattr(material, "displacement_method", None), *parts)
 
-    def passes(self, body, wanted, of_object):
+    def passes(self, body, wanted, of_object, size):
         """Bake on `body`, whose mesh has the UV map. Returns {(slot, pass): texels (size, size, 4)}, alpha 0 where
         empty.
 
@@ -100,7 +103,7 @@ class Baker:
         found = {}
         shape = bake_cache.mesh_digest(body.data)
         place = (body.name, [tuple(row) for row in body.matrix_world], tuple(body.color), body.pass_index,
-                 body.get(standin.RANDOM))
+                 sorted(attributes.numbers_of(body).items()), sorted(self._attributes.items()))
         names = sorted({name for _, values in wanted.values() for name in values})
         for name in names:
             now, keys, shaders = {}, {}, []
@@ -109,14 +112,14 @@ class Baker:
                     continue
                 connect = _connect_normal if name == "normal" else _connect_emission
                 shaders.append((graph, connect(graph, values[name])))
-                keys[slot] = self._key(graph, shape, slot, self.size, name, place if of_object else None)
+                keys[slot] = self._key(graph, shape, slot, size, name, place if of_object else None)
                 texels = bake_cache.load(keys[slot])
                 if texels is None:
                     now[slot] = graph
                 else:
                     found[slot, name] = texels.astype(numpy.float32)
             if now:
-                made = self._texels(body, now, "NORMAL" if name == "normal" else "EMIT", self.size)
+                made = self._texels(body, now, "NORMAL" if name == "normal" else "EMIT", size)
                 for slot, texels in made.items():
                     stored = _rounded(texels)  # used by this export, too, so that the next one writes equal bytes
                     bake_cache.store(keys[slot], stored)

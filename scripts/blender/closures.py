@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import bpy
 
+import attributes
 from graph import is_constant, source_socket, upstream
 
 _DEPENDS_ON_VIEW = {
@@ -114,9 +115,12 @@ def fix_view_dependence(graph, surface, tree, say):
         if node.type == "LIGHT_PATH":
             _replace(output, 1.0 if output.name == "Is Camera Ray" else 0.0)
             say("Light Path: all rays see what the camera sees")
+        elif node.type == "PARTICLE_INFO":
+            say(f"{output.name} of its Particle Info node is not carried: all particles look alike; give instances of geometry "
+                "nodes an attribute instead (Store Named Attribute, Instance), and read it by an Attribute node of the type "
+                "Instancer")
         elif node.type == "ATTRIBUTE" and node.attribute_type == "INSTANCER":
-            say(f'its attribute "{node.attribute_name}" of the instancer is not carried: all instances have the value of '
-                "the object itself")
+            attributes.read_from_object(node)
         elif output.name in _DEPENDS_ON_VIEW.get(node.type, ()):
             _replace(output, _typical(node, output))
             if node.as_pointer() not in known:

@@ -273,12 +273,13 @@ class Graph:
             self.connect(value, socket)
         return node.outputs[0]
 
-    def varies(self, value):
-        """Whether a value varies over the surface: some node upstream depends on more than its inputs."""
+    def varies(self, value, is_even=lambda node: False):
+        """Whether a value varies over the surface: some node upstream depends on more than its inputs, and `is_even(node)`
+        is false."""
         if is_constant(value):
             return False
         probe = self.tree.nodes.new("NodeReroute")
         self.tree.links.new(value, probe.inputs[0])
-        kinds = {node.type for node, _ in upstream(probe.inputs[0]).values()}
+        nodes = [node for node, _ in upstream(probe.inputs[0]).values()]
         self.tree.nodes.remove(probe)
-        return not kinds <= FUNCTIONS
+        return not all(node.type in FUNCTIONS or is_even(node) for node in nodes)

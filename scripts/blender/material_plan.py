@@ -72,6 +72,7 @@ class Plan:
         self.material, self.baker, self.may_bake, self.undo, self.warn = material, baker, may_bake, undo, warn
         self.stretched = stretched
         self.passes, self.channels, self.unbaked, self.of_object = {}, {}, {}, False
+        self.varies_on_object = True
         self.graph, self.matched = match(material, undo, self.say, stretched)
         direct_images.warn_of_missing(self.graph.trees(), f'material "{material.name}"', warn)
         self.links = {}
@@ -112,6 +113,8 @@ class Plan:
             self.passes = {name: value if value is None or is_constant(value) else made.get(value, value)
                            for name, value in self.passes.items()}
             self.of_object = standin.depends_on_object(self.graph)
+            self.varies_on_object = any(value is None or self.graph.varies(value, standin.is_even_on_object)
+                                        for value in self.passes.values())
             names = [_DISPLAY_NAMES[n] for n in varying if n not in {"direction"}]
             self.say(f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} baked to images of {self.baker.size} x "
                      f"{self.baker.size} texels, which blur finer detail: use image textures there, or a larger "

@@ -19,6 +19,8 @@ import export_guard as guard
 # The attribute of a mesh's corners that Blender's exporter writes. It numbers the vertices that the exporter must keep
 # apart, because their positions or normals differ at some time.
 CORNER = "_CAUSTIQUE_CORNER"
+# The attribute of a mesh's points with their velocity (m/s), as simulations and caches write it.
+VELOCITY = "velocity"
 _MAX_LABELS = 2 ** 24  # whole numbers in single precision
 _NORMAL_STEPS = 1e4  # per unit: normals closer than one step are equal
 _STILL = 3e-7  # relative difference of numbers in single precision that counts as no motion
@@ -111,11 +113,14 @@ class Shape:
 
     def settle(self, rate, warn):
         """Complete the samples after the last time, at `rate` frames per second."""
-        if self._differs:
-            self.points = self._by_velocity(rate)
-            if not self.points:
-                warn(f'object "{self.name}"', "its faces change while the shutter is open, and it has no velocity "
-                     "attribute: " + _SHAPE_STANDS)
+        moved = self._by_velocity(rate)
+        if moved:  # also if the faces stay, because simulations stand still between whole frames
+            self.points = moved
+        elif self._differs:
+            self.points = {}
+            warn(f'object "{self.name}"', "its faces change while the shutter is open, and it has no attribute velocity: "
+                 f"{_SHAPE_STANDS}; switch on Speed Vectors in the domain's panel Mesh, or store the attribute by geometry "
+                 "nodes (Store Named Attribute, vectors of points, m/s)")
         elif self.points:
             here = points_of(self.mesh)
             self.points = {time: self.points.get(time, here) for time in self._seen | {0.0}}
@@ -137,7 +142,7 @@ class Shape:
 
     def _by_velocity(self, rate):
         """Points that move along the mesh's velocity attribute (m/s), as Cycles moves meshes whose faces change."""
-        layer = self.mesh.attributes.get("velocity")
+        layer = self.mesh.attributes.get(VELOCITY)
         if layer is None or layer.domain != "POINT" or layer.data_type != "FLOAT_VECTOR":
             return {}
         here, velocity, found = points_of(self.mesh), _vectors(layer.data, "vector"), {}

@@ -13,6 +13,7 @@ import bmesh
 import numpy
 from mathutils import Matrix
 
+import attributes
 import camera_export
 import export_guard as guard
 import motion
@@ -59,7 +60,7 @@ class FlatScene:
         self.stretched, self._bakes = set(), bakes
         self._warn, self._meshes, self._shapes, self._made, self._applied = warn, {}, [], [], {}
         self._indirect, self._layer = visibility.indirect_only(layer), layer
-        self.motion = motion.Recorder(scene, layer, warn)
+        self.motion, self._attributes = motion.Recorder(scene, layer, warn), attributes.Attributes(warn)
         self.scene = bpy.data.scenes.new(scene.name)
         self.names[self.scene.name] = scene.name
         undo.callback(bpy.data.scenes.remove, self.scene)
@@ -67,6 +68,8 @@ class FlatScene:
         undo.callback(lambda: bpy.data.batch_remove(self._made))
         for name in ("resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y"):
             setattr(self.scene.render, name, getattr(scene.render, name))
+        for name, value in self._attributes.of_scene(scene, layer).items():
+            self.scene[name] = value
         self.scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
         depsgraph = bpy.context.evaluated_depsgraph_get()
         # Collect all instances first: new objects invalidate the depsgraph's iterator.
@@ -88,7 +91,7 @@ class FlatScene:
             camera = scene.camera.evaluated_get(depsgraph)
             place, key = camera.matrix_world.copy(), motion.identity_of(scene.camera)
             self.motion.expect(key, camera, None, place)
-            found.append((scene.camera, scene.camera.data, place, [], None, 0.0, key))
+            found.append((scene.camera, scene.camera.data, place, [], None, {}, key))
         guard.attempt(warn, f'scene "{scene.name}"', None, "nothing moves while the shutter is open",
                       self.motion.record)
         for mesh, original in self._shapes:
@@ -119,8 +122,8 @@ class FlatScene:
         return block
 
     def _take(self, instance, depsgraph):
-        """Object, data, world matrix, hidden rays, light group, random number (0 to 1) and key (`motion.identity`) of
-        an instance, or None if it is invisible."""
+        """Object, data, world matrix, hidden rays, light group, properties and key (`motion.identity`) of an instance, or
+        None if it is invisible. The properties are its random number (0 to 1), and the attributes that materials read."""
         thing = instance.object
         if not (instance.is_instance or instance.show_self) or thing.type in _INVISIBLE or _is_pattern(instance):
             return None
@@ -129,8 +132,9 @@ class FlatScene:
             return None
         data = thing.original.data
         random = instance.random_id & 0xFFFFFFFF if instance.is_instance else _random_of_name(thing.name)
+        properties = {standin.RANDOM: random / 0xFFFFFFFF, **self._attributes.of_instance(instance)}
         if thing.type == "VOLUME":
-            return self._volume(instance, random)
+            return self._volume(instance, properties)
         if any(m.type == "FLUID" and m.fluid_type == "DOMAIN" and m.domain_settings.domain_type == "GAS"
                for m in thing.modifiers):
             self._warn(f'object "{thing.name}"', f"its smoke is not carried: {_OUT}; save its cache as OpenVDB, and import "
@@ -150,9 +154,9 @@ class FlatScene:
         if (instance.parent or thing).name in self._indirect and "camera" not in hidden:
             hidden.append("camera")
         group = visibility.light_group(thing, parent, self._layer)
-        return data and (thing.original, data, matrix, hidden, group, random / 0xFFFFFFFF, key)
+        return data and (thing.original, data, matrix, hidden, group, properties, key)
 
-    def _volume(self, instance, random):
+    def _volume(self, instance, properties):
         """`_take` of a volume: a box with a medium."""
         thing = instance.object
         made = volumes.box(thing, self._warn)
@@ -167,7 +171,7 @@ class FlatScene:
         parent, key = instance.parent if instance.is_instance else None, motion.identity(instance)
         hidden, group = visibility.hidden_rays(thing, parent), visibility.light_group(thing, parent, self._layer)
         matrix = instance.matrix_world @ volume.matrix
-        return thing.original, mesh, matrix, hidden, group, random / 0xFFFFFFFF, key
+        return thing.original, mesh, matrix, hidden, group, properties, key
 
     def _mesh(self, instance, depsgraph):
         """The evaluated mesh of an instance, shared with equal instances; None without faces."""
@@ -198,9 +202,10 @@ class FlatScene:
     def _deformable(instance, data):
         """`data` if it is a mesh that may deform while the shutter is open, else None."""
         still = not _is_by_nodes(instance) and _is_unmodified(instance.object.original)
+        still = still and not (isinstance(data, bpy.types.Mesh) and motion.VELOCITY in data.attributes)
         return data if isinstance(data, bpy.types.Mesh) and not still else None
 
-    def _put(self, original, data, matrix, hidden, group, random, key):
+    def _put(self, original, data, matrix, hidden, group, properties, key):
         if not all(math.isfinite(x) for row in matrix for x in row):
             self._warn(f'object "{original.name}"', f"its place is not a number: {_OUT}")
             return
@@ -215,7 +220,9 @@ class FlatScene:
         body = self.add(original.name, data, matrix, hidden, group)
         guard.attempt(self._warn, self.where(body), None, motion.STANDS_STILL,
                       self.motion.follow, key, body, matrix, at_frame, self)
-        body.color, body.pass_index, body[standin.RANDOM] = original.color, original.pass_index, random
+        body.color, body.pass_index = original.color, original.pass_index
+        for name, value in properties.items():
+            body[name] = value
         if original.type != "LIGHT" and original.is_shadow_catcher:
             self.add_extras(body, shadow_catcher=True)
         if "caustique" in original:

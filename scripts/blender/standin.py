@@ -27,6 +27,12 @@ _DEFORM = {
 }
 
 
+def is_even_on_object(node):
+    """Whether the outputs of a shader node have one value on an object."""
+    return node.type == "OBJECT_INFO" or (
+        node.type == "ATTRIBUTE" and node.attribute_type != "GEOMETRY")
+
+
 def depends_on_object(graph):
     """Whether a material depends on its object: on the object's transform, index, colour or random number."""
     for tree in graph.trees():

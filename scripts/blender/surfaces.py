@@ -13,6 +13,8 @@ import standin
 import subsurface
 from material_plan import Plan, matt
 
+_EVEN_SIZE = 64  # texels per side of the images of materials that have one value on an object
+
 
 def materials_of(thing):
     """The materials of an object by slot, None for an empty slot, then those that its modifiers add."""
@@ -169,9 +171,10 @@ class Surfaces:
         if any(plan.stretched for plan in plans.values()):
             standin.add_normal_map_axes(mesh)
         wanted = {slot: (plan.graph, plan.passes) for slot, plan in plans.items()}
+        size = self.size if any(plan.varies_on_object for plan in plans.values()) else min(_EVEN_SIZE, self.size)
         with self.baker.on_stage(body):
             standin.unwrap(body, self.size)
-            texels = self.baker.passes(body, wanted, own)
+            texels = self.baker.passes(body, wanted, own, size)
         texcoord = standin.keep_two_uv_maps(mesh)
         for slot, plan in plans.items():
             material = plan.make_principled()

@@ -106,6 +106,32 @@ class Blurred(blender_motion.Moving):
         self.keyed(light, "location", (-10, -5, 0.5), (10, 5, 0.5))
         self.agrees()
 
+    def fluid(self, changes):
+        """A sheet that geometry nodes make, with the attribute velocity: its faces change from frame to frame or stay."""
+        tree = bpy.data.node_groups.new("fluid", "GeometryNodeTree")
+        tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+        grid, store, wear, end, time = (tree.nodes.new(kind) for kind in (
+            "GeometryNodeMeshGrid", "GeometryNodeStoreNamedAttribute", "GeometryNodeSetMaterial", "NodeGroupOutput",
+            "GeometryNodeInputSceneTime"))
+        grid.inputs["Size X"].default_value, grid.inputs["Size Y"].default_value = 0.8, 1.2
+        if changes:
+            tree.links.new(time.outputs["Frame"], grid.inputs["Vertices X"])
+        store.data_type, store.domain = "FLOAT_VECTOR", "POINT"
+        store.inputs["Name"].default_value = "velocity"
+        next(s for s in store.inputs if s.type == "VECTOR").default_value = (36, 18, 0)
+        wear.inputs["Material"].default_value = glow("fluid", (0.3, 0.6, 1))
+        for one, other in zip((grid, store, wear), (store, wear, end)):
+            tree.links.new(one.outputs[0], other.inputs[0])
+        shared.place("fluid", square(None)).modifiers.new("nodes", "NODES").node_group = tree
+
+    def test_fluids(self):
+        """Meshes of any faces move by their attribute velocity while the shutter is open, as Cycles moves them."""
+        for changes in (True, False):
+            with self.subTest(changes=changes):
+                self.fluid(changes)
+                self.agrees()
+                bpy.data.objects.remove(bpy.data.objects["fluid"])
+
     def test_frames(self):
         """A frame of a sequence is blurred as the frame alone."""
         self.keyed(self.square(), "location", (-6, -3, 0), (4, 1, 0))

@@ -145,6 +145,74 @@ class Agrees(cycles_comparison.CyclesComparison):
         self.alike(self.caustique(16), theirs)
         self.assertNotIn("random", str(glb.read(self.path)[0]))
 
+    def reading(self, kind, name):
+        """A material that emits the attribute `name` of the type `kind`."""
+        material = glow("tested", (1, 1, 1))
+        tree = material.node_tree
+        node = tree.nodes.new("ShaderNodeAttribute")
+        node.attribute_type, node.attribute_name = kind, name
+        tree.links.new(node.outputs["Color"], self.shader(material).inputs["Color"])
+        return material
+
+    def test_attributes_of_objects(self):
+        """Materials read attributes of points, objects, meshes, instancers and view layers, as in Cycles."""
+        points = shared.place("points", square(self.reading("GEOMETRY", "tint"), 0.4), (-1, -0.5, 0))
+        points.data.attributes.new("tint", "FLOAT_COLOR", "POINT").data.foreach_set("color", [0.1, 0.7, 0.3, 1] * 4)
+        of_object, of_instancer = self.reading("OBJECT", "tint"), self.reading("INSTANCER", "tint")
+        shared.place("object", square(of_object, 0.4), (0, -0.5, 0))["tint"] = (0.9, 0.2, 0.4)
+        of_mesh = shared.place("mesh", square(of_object, 0.4), (1, -0.5, 0))
+        of_mesh.data["tint"] = (0.2, 0.2, 0.8)
+        self.scene["tint"], self.scene.view_layers[0]["tint"] = (1.0, 0.0, 0.0), (0.5, 0.1, 0.9)
+        shared.place("layer", square(self.reading("VIEW_LAYER", "tint"), 0.4), (-1, 0.5, 0))
+        inside = bpy.data.collections.new("inside")
+        inner = shared.place("inner", square(of_instancer, 0.4))
+        inner["tint"] = (0.8, 0.8, 0.1)
+        self.scene.collection.objects.unlink(inner)
+        inside.objects.link(inner)
+        for x, tint in ((0, (0.1, 0.3, 0.9)), (1, None)):
+            copy = shared.place("copy", None, (x, 0.5, 0))
+            copy.instance_type, copy.instance_collection = "COLLECTION", inside
+            if tint:
+                copy["tint"] = tint
+        eye((0, 0, 3), (0, 0, 0), type="ORTHO", ortho_scale=3)
+        theirs = self.cycles(64)
+        self.assertGreater(theirs.std((0, 1)).min(), 0.1)
+        self.alike(self.caustique(64), theirs)
+
+    @unittest.skipIf(bpy.app.version < (4, 5, 0), "Python reads attributes of instances from Blender 4.5 on")
+    def test_attributes_of_instances(self):
+        """The instances of geometry nodes have each their own attribute, those of objects and those of meshes."""
+        inner = shared.place("inner", square(self.reading("INSTANCER", "tint"), 0.4), (0, 0, -9))
+        for y, of_object in ((-0.5, True), (0.5, False)):
+            tree = bpy.data.node_groups.new("instances", "GeometryNodeTree")
+            tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+            line, copies, store, index, share, wear, end = (tree.nodes.new(kind) for kind in (
+                "GeometryNodeMeshLine", "GeometryNodeInstanceOnPoints", "GeometryNodeStoreNamedAttribute",
+                "GeometryNodeInputIndex", "ShaderNodeMath", "GeometryNodeSetMaterial", "NodeGroupOutput"))
+            line.inputs["Count"].default_value, line.inputs["Offset"].default_value = 3, (1, 0, 0)
+            made = tree.nodes.new("GeometryNodeObjectInfo" if of_object else "GeometryNodeMeshGrid")
+            if of_object:
+                made.inputs["Object"].default_value, made.inputs["As Instance"].default_value = inner, True
+                tree.links.new(made.outputs["Geometry"], copies.inputs["Instance"])
+            else:
+                made.inputs["Size X"].default_value = made.inputs["Size Y"].default_value = 0.8
+                wear.inputs["Material"].default_value = inner.data.materials[0]
+                tree.links.new(made.outputs["Mesh"], wear.inputs["Geometry"])
+                tree.links.new(wear.outputs[0], copies.inputs["Instance"])
+            share.operation, share.inputs[1].default_value = "MULTIPLY_ADD", 0.3
+            share.inputs[2].default_value = 0.2
+            store.data_type, store.domain, store.inputs["Name"].default_value = "FLOAT_COLOR", "INSTANCE", "tint"
+            tree.links.new(line.outputs[0], copies.inputs["Points"])
+            tree.links.new(index.outputs[0], share.inputs[0])
+            tree.links.new(share.outputs[0], next(s for s in store.inputs if s.type == "RGBA"))
+            tree.links.new(copies.outputs[0], store.inputs[0])
+            tree.links.new(store.outputs[0], end.inputs[0])
+            shared.place("nodes", square(None), (-1, y, 0)).modifiers.new("nodes", "NODES").node_group = tree
+        eye((0, 0, 3), (0, 0, 0), type="ORTHO", ortho_scale=3)
+        theirs = self.cycles(64)
+        self.assertGreater(theirs.std(), 0.2)
+        self.alike(self.caustique(64), theirs)
+
     def test_cameras_under_scaled_parents(self):
         self.floor(1.0)
         self.world((1, 1, 1))
@@ -269,15 +337,6 @@ class Named(cycles_comparison.CyclesComparison):
                 image.pack()
                 found = line in "".join(export.write(self.path, bake_size=16))
                 self.assertEqual(found, value > 0.5, (extension, value))
-
-    def test_attributes_of_instancers(self):
-        material = glow("tested", (1, 1, 1))
-        tree = material.node_tree
-        node = tree.nodes.new("ShaderNodeAttribute")
-        node.attribute_type, node.attribute_name = "INSTANCER", "tint"
-        tree.links.new(node.outputs["Color"], next(n for n in tree.nodes if n.type == "EMISSION").inputs["Color"])
-        shared.place("wall", square(material, 1.0))
-        self.named('its attribute "tint" of the instancer is not carried')
 
     def test_volumes_that_nodes_make(self):
         body = shared.place("cloud", square(glow("tested", (1, 1, 1)), 1.0))

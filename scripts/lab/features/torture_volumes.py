@@ -50,5 +50,11 @@ def volume_scaled(stage):
 
 @feature
 def volume_fire(stage):
-    _cloud(stage, lambda density: 600 + 900 * density, Color=(0.4, 0.4, 0.4), Density=2.0, Blackbody_Intensity=1.0,
-           Temperature=1.0)
+    _cloud(
+        stage,
+        lambda density: 600 + 900 * density,
+        Color=(0.4, 0.4, 0.4),
+        Density=2.0,
+        Blackbody_Intensity=1.0,
+        Temperature=1.0,
+    )

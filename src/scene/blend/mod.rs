@@ -13,7 +13,8 @@ use crate::stop::Stop;
 use std::path::Path;
 
 /// Names and contents of the exporter's files (in Python), embedded in the program.
-const SOURCES: [(&str, &str); 30] = [
+const SOURCES: [(&str, &str); 31] = [
+    ("attributes.py", include_str!("../../../scripts/blender/attributes.py")),
     ("bake.py", include_str!("../../../scripts/blender/bake.py")),
     ("bake_cache.py", include_str!("../../../scripts/blender/bake_cache.py")),
     ("camera_export.py", include_str!("../../../scripts/blender/camera_export.py")),
