@@ -25,7 +25,8 @@ def add_cameras(flat, warn):
         if thing.data.type == "PANO":  # Blender's exporter would leave it out
             thing.data = flat.remove_later(thing.data.copy())
             thing.data.type = "PERSP"
-            warn(flat.where(thing), "panoramic cameras are not carried: it is a perspective camera here")
+            warn(flat.where(thing), "panoramic cameras are not carried: it is a perspective camera here; "
+                                    "choose Lens > Type > Perspective")
         keys = guard.attempt(warn, flat.where(thing), {}, "it has no lens, shift or other projection",
                              extras, thing, flat, warn)
         flat.add_extras(thing, **keys)
@@ -40,7 +41,8 @@ def extras(thing, flat, warn):
     """
     dof = thing.data.dof
     if dof.use_dof and (dof.aperture_blades or dof.aperture_ratio != 1):
-        warn(flat.where(thing), "the shape of the aperture is not carried: it is round")
+        warn(flat.where(thing), "the shape of the aperture is not carried: it is round; "
+                                "set Depth of Field > Aperture > Blades to 0 and Ratio to 1 to see the same in both")
     keys = optics(thing, flat.scene.render)
     del keys["view"]
     return keys
@@ -109,7 +111,7 @@ def picture(scene, warn):
     share = render.resolution_percentage / 100
     said = {"resolution": [max(round(n * share), 1) for n in (render.resolution_x, render.resolution_y)]}
     if render.pixel_aspect_x != render.pixel_aspect_y:
-        warn(where, "its pixels are rendered as squares: set both pixel aspects to 1")
+        warn(where, "its pixels are rendered as squares; set both pixel aspects to 1")
     if render.use_border:
         left, right, low, high = (getattr(render, f"border_{name}") for name in ("min_x", "max_x", "min_y", "max_y"))
         said["crop"] = [left, 1 - high, right - left, high - low]
@@ -166,7 +168,8 @@ def _warn_of_limits(scene, where, warn):
              if 0 < getattr(cycles, "sample_clamp_" + name) != usual]
     if clamp:
         warn(where, f"Cycles' clamping of bright samples is not carried ({', '.join(clamp)}): there is more light here, "
-                    "as with clamps of 0 in Cycles")
+                    "as with clamps of 0 in Cycles; "
+                    "set Light Paths > Clamping to 0 to see the same in Cycles")
 
 
 def _has_compositor(scene):

@@ -114,7 +114,8 @@ def fix_view_dependence(graph, surface, tree, say):
     for node, output in upstream(surface).values():
         if node.type == "LIGHT_PATH":
             _replace(output, 1.0 if output.name == "Is Camera Ray" else 0.0)
-            say("Light Path: all rays see what the camera sees")
+            say("Light Path: all rays see what the camera sees; "
+                "unlink it, because glass casts caustics here without such nodes")
         elif node.type == "PARTICLE_INFO":
             say(f"{output.name} of its Particle Info node is not carried: all particles look alike; give instances of geometry "
                 "nodes an attribute instead (Store Named Attribute, Instance), and read it by an Attribute node of the type "
@@ -125,8 +126,11 @@ def fix_view_dependence(graph, surface, tree, say):
             _replace(output, _typical(node, output))
             if node.as_pointer() not in known:
                 say(f"{output.name} of its {node.bl_label} node depends on the view: its mean over all directions is "
-                    "taken" if node.type in {"FRESNEL", "LAYER_WEIGHT"} else
-                    f"{output.name} of its {node.bl_label} node depends on the view: it is taken as from the front")
+                    "taken; "
+                    "link a Fresnel node as the factor of Glossy over Diffuse, Refraction or Transparent, which is "
+                    "carried" if node.type in {"FRESNEL", "LAYER_WEIGHT"} else
+                    f"{output.name} of its {node.bl_label} node depends on the view: it is taken as from the front; "
+                    "link UV, Generated or Object coordinates instead")
 
 
 def _replace(output, value):

@@ -204,7 +204,8 @@ def _export_all_it_can(path, flat, warn):
         return
     _, bad = guard.exportable(flat.things, works)
     for thing in bad:
-        warn(flat.where(thing), f"Blender's exporter fails on it ({faults[0]}): it is left out")
+        warn(flat.where(thing), f"Blender's exporter fails on it ({faults[0]}): it is left out; "
+                                "apply its modifiers (Object > Apply > Visual Geometry to Mesh)")
         flat.remove(thing)
     if not works(flat.things):
         raise RuntimeError(f"Blender's glTF exporter fails: {faults[-1]}")
@@ -290,7 +291,7 @@ def _warn_of_refused_drivers(scene, warn):
     """Warn if Blender has refused to run the Python of a driver in the file."""
     if bpy.app.autoexec_fail and bpy.app.autoexec_fail_message.startswith("Driver"):
         warn(f'scene "{scene.name}"', f"Python in the file does not run ({bpy.app.autoexec_fail_message}), and what it "
-             "drives keeps its last value: use a simple expression, or bake the values to keyframes")
+             "drives keeps its last value; use a simple expression, or bake the values to keyframes")
 
 
 def _leaning_share(mesh, degrees):

@@ -13,7 +13,8 @@ def attempt(warn, where, otherwise, instead, work, *arguments):
         return work(*arguments)
     except Exception as error:  # files from anywhere, many versions of Blender: no list of kinds could be complete
         traceback.print_exc(file=sys.stderr)
-        warn(where, f"it cannot be exported as it is ({summary(error)}): {instead}")
+        warn(where, f"it cannot be exported as it is ({summary(error)}): {instead}; "
+                    "apply its modifiers and make it local, or report the error with the file")
         return otherwise
 
 

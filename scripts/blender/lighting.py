@@ -102,7 +102,9 @@ def add_lamps(flat, warn):
 def _add_lamp(thing, flat, warn):
     light = thing.data
     if light.type == "AREA" and getattr(light.cycles, "is_portal", False):
-        warn(flat.where(thing), "it is a portal, which guides Cycles' samples of the sky: it is left out")
+        warn(flat.where(thing), "it is a portal, which guides Cycles' samples of the sky: it is left out; "
+                                                            "nothing is lost, because the sky is sampled without "
+                                                            "portals")
         flat.remove(thing)
         return
     _warn_of(thing, flat.where(thing), warn)
@@ -211,9 +213,11 @@ def _warn_of(thing, where, warn):
     """Warn of a lamp's features that are lost."""
     light, scale = thing.data, [abs(s) for s in thing.matrix_world.to_scale()]
     if not getattr(light, "use_shadow", True):
-        warn(where, "it casts no shadows in Cycles: here it does")
+        warn(where, "it casts no shadows in Cycles: here it does; "
+                    "move it to where nothing blocks it")
     if light.type == "SPOT" and max(scale) > 1.001 * min(scale):
-        warn(where, "a spot's uneven scale is not carried: its cone is round")
+        warn(where, "a spot's uneven scale is not carried: its cone is round; "
+                    "apply its scale (Object > Apply > Scale)")
 
 
 def _measure_nodes(thing, flat, warn):
@@ -238,7 +242,8 @@ def _measure_nodes(thing, flat, warn):
     if not kinds <= FUNCTIONS | {"EMISSION", "ADD_SHADER", "MIX_SHADER"}:
         what = "its IES profile is not carried" if profile else "its shader nodes are not carried"
         warn(flat.where(thing), f"{what}: it shines alike in all directions, with the mean strength of those that "
-             f"meet objects, at {distance:.3g} m")
+             f"meet objects, at {distance:.3g} m; "
+             "give the nodes to a spot or an area light, whose pictures are carried")
 
 
 def _usual_distance(thing, flat):
@@ -262,7 +267,7 @@ def warn_of_soft_falloff(flat, warn):
         near = next((body for body in bodies if _within(body, thing.matrix_world.translation, reach, depsgraph)), None)
         if near is not None:
             warn(flat.where(thing), f"its soft falloff is not carried: {flat.where(near)} is within {reach:.3g} m of "
-                 "it and gets more light than in Cycles (where Soft Falloff off shows the same)")
+                 "it and gets more light than in Cycles; switch Soft Falloff off to see the same in both")
 
 
 def _within(body, point, reach, depsgraph):

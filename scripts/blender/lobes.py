@@ -13,7 +13,7 @@ ROUGH, METALLIC = 0.42, 0.5
 _BRIGHT = 0.5  # largest component of the colour, below which little light scatters between facets
 ROUGH_METAL_WARNING = (
     "the light that its rough metal scatters between facets leaves in all directions: in Cycles it stays in the highlight, "
-    "which is up to a quarter brighter there")
+    "which is up to a quarter brighter there; lower Roughness to 0.42 to see the same in both")
 
 
 @dataclass
@@ -65,7 +65,8 @@ class Reader:
             return self._dielectric(leaf)
         read = _READERS.get(leaf.type)
         if read is None:
-            self.say(f"its {node.bl_label} shader is approximated by diffuse reflection of its colour")
+            self.say(f"its {node.bl_label} shader is approximated by diffuse reflection of its colour; "
+                     "use a Principled BSDF, whose inputs are all carried")
             read = Reader._diffuse
         return read(self, leaf)
 
@@ -123,7 +124,8 @@ class Reader:
             lobe.sheet, lobe.sheet_colour = weight, lobe.base
         elif lobe.base != BLACK:
             self.say("subsurface scattering is carried where its radius, index and anisotropy are constant: its light "
-                     "leaves where it arrives")
+                     "leaves where it arrives; "
+                     "unlink Radius, Scale, IOR and Anisotropy")
 
     def _translucent(self, leaf):
         return Lobe(sheet=1.0, sheet_colour=self.get(leaf, "Color"), normal=self.normal(leaf), faceted=False)
@@ -132,19 +134,22 @@ class Reader:
         """Glossy reflectance is constant; a metal's rises at grazing angles, by 1/21 of the remainder on average."""
         colour = self.get(leaf, "Color")
         if is_constant(colour) and max(colour) - min(colour) > 0.1:
-            self.say("the reflectance of its tinted Glossy shader rises towards the rim")
+            self.say("the reflectance of its tinted Glossy shader rises towards the rim; "
+                     "use a Metallic BSDF, whose reflectance rises in both")
         colour = self.graph.maximum(self.graph.multiply(self.graph.subtract(colour, 1 / 21), 21 / 20), 0.0)
         return self._facets(leaf, Lobe(base=colour, metallic=1.0, specular=0.0))
 
     def _metal(self, leaf):
         if getattr(leaf.node, "fresnel_type", "F82") == "PHYSICAL_CONDUCTOR":
-            self.say("the conductor's reflectance is Schlick's from the one at normal incidence")
+            self.say("the conductor's reflectance is Schlick's from the one at normal incidence; "
+                     "choose F82 Tint with a white Edge Tint to see the same in both")
             n, k = (self.graph.value(leaf.node.inputs[name], leaf.path) for name in ("IOR", "Extinction"))
             colour = self._conductor(n, k)
         else:
             colour = self.get(leaf, "Base Color")
             if self.get(leaf, "Edge Tint") != WHITE:
-                self.say("the Edge Tint of its Metallic shader is not carried: the rim reflects white")
+                self.say("the Edge Tint of its Metallic shader is not carried: the rim reflects white; "
+                         "set Edge Tint to white to see the same in both")
         return self._facets(leaf, Lobe(base=colour, metallic=1.0))
 
     def _conductor(self, n, k):
@@ -160,7 +165,7 @@ class Reader:
         if leaf.type == "BSDF_GLASS":  # Cycles also tints its reflection
             lobe.specular = self.graph.minimum(self.graph.max_component(colour), 1.0)
             lobe.specular_colour = self.graph.divide(colour, self.graph.maximum(lobe.specular, 1e-6))
-            if is_constant(colour) and min(colour) < 0.7:
+            if is_constant(colour) and min(colour) < 0.65:
                 self.say("the tint of its Glass shader's reflections is carried at steep angles only: its rim is brighter "
                          "than in Cycles; tint a Principled BSDF with Transmission instead, whose reflections are white in "
                          "both")
@@ -199,7 +204,8 @@ class Reader:
 
     def _distribution(self, leaf, lobe):
         if lobe.roughness != 0.0 and getattr(leaf.node, "distribution", "GGX") in {"BECKMANN", "ASHIKHMIN_SHIRLEY"}:
-            self.say(f"its {leaf.node.distribution.title()} facets are taken for GGX")
+            self.say(f"its {leaf.node.distribution.title()} facets are taken for GGX; "
+                     "choose Multiscatter GGX to see the same in both")
         # Blender's MULTI_GGX keeps the light that scatters between facets, as caustique does; its GGX loses it.
         known = is_constant(lobe.roughness) and is_constant(lobe.metallic)
         bright = not is_constant(lobe.base) or max(lobe.base) > _BRIGHT
@@ -211,7 +217,7 @@ class Reader:
             lobe.base = self._darkened(lobe)
         if (lobe.metallic, lobe.transmission) != (0.0, 0.0) and not (is_constant(lobe.roughness) and lobe.roughness < ROUGH):
             what = "approximated by a darker metal" if lobe.transmission == 0.0 else "not carried for glass"
-            self.say(f"its distribution GGX loses light between rough facets, which is {what}: choose Multiscatter GGX "
+            self.say(f"its distribution GGX loses light between rough facets, which is {what}; choose Multiscatter GGX "
                      "to see the same in both")
 
     def _darkened(self, lobe):
@@ -248,7 +254,8 @@ class Reader:
         lobe.anisotropy = g.power(g.maximum(g.divide(g.subtract(along, across), rest), 0.0), 0.5)
         lobe.roughness = g.power(across, 0.5)
         lobe.tangent = self._tangent(leaf, turn)
-        self.say("its stretched highlights keep the few per cent of light that Cycles loses between facets")
+        self.say("its stretched highlights keep the few per cent of light that Cycles loses between facets; "
+                 "darken its colour by a few per cent to match Cycles")
         return lobe
 
     def _tangent(self, leaf, turns):
@@ -269,7 +276,8 @@ class Reader:
 
     def _sheen(self, leaf):
         if getattr(leaf.node, "distribution", "") == "ASHIKHMIN":
-            self.say("its Ashikhmin sheen is taken for Microfiber")
+            self.say("its Ashikhmin sheen is taken for Microfiber; "
+                     "choose Microfiber to see the same in both")
         return Lobe(sheen=self.get(leaf, "Color"), faceted=False, normal=self.normal(leaf),
                     sheen_roughness=self.get(leaf, "Roughness"))
 
@@ -286,12 +294,14 @@ class Reader:
         lobe.base = g.add(g.multiply(lobe.base, g.subtract(1.0, clear)), g.multiply(g.power(lobe.base, 0.5), clear))
         both = is_constant(clear) and 0 < clear < 1
         if both and is_constant(lobe.base) and max(lobe.base) - min(lobe.base) > 0.1:
-            self.say("the colour of its diffuse and of its transmitted light is one: their mean is taken")
+            self.say("the colour of its diffuse and of its transmitted light is one: their mean is taken; "
+                     "set Transmission > Weight to 0 or 1, or make Base Color grey")
         self._reflectance(leaf, lobe)
         self._facets(leaf, lobe)
         self._coverings(leaf, lobe)
         if lobe.metallic != 0.0 and self.get(leaf, "Specular Tint") != WHITE:
-            self.say("the tint of its metal's rim (Specular Tint) is not carried: the rim reflects white")
+            self.say("the tint of its metal's rim (Specular Tint) is not carried: the rim reflects white; "
+                     "set Specular > Tint to white to see the same in both")
         if lobe.metallic != 1.0 and lobe.transmission != 1.0:
             share = g.multiply(g.subtract(1.0, lobe.metallic), g.subtract(1.0, lobe.transmission))
             self._roughen(lobe, self._diffuse_roughness(leaf, "Diffuse Roughness"), share)
@@ -301,7 +311,8 @@ class Reader:
                 entry = self.get(leaf, "IOR"), g.power(self.get(leaf, "Roughness"), 2.0)
                 self._enter(leaf, lobe, weight, (inputs, entry), (lobe.ior, lobe.specular), leaf.node.subsurface_method)
             elif weight != 0.0:
-                self.say("subsurface scattering is not carried beside transmission: light leaves where it arrives")
+                self.say("subsurface scattering is not carried beside transmission: light leaves where it arrives; "
+                         "set Transmission > Weight or Subsurface > Weight to 0")
         self._film(leaf, lobe)
         return lobe
 
@@ -309,7 +320,7 @@ class Reader:
         """Set specular and index: Cycles scales the reflectance at normal incidence by twice the specular level."""
         g, level = self.graph, self.get(leaf, "Specular IOR Level")
         if is_constant(lobe.ior) and lobe.ior < 1:
-            self.say(f"its IOR of {lobe.ior:.3g} is below 1, where it reflects more than in Cycles: use 1 or more")
+            self.say(f"its IOR of {lobe.ior:.3g} is below 1, where it reflects more than in Cycles; use 1 or more")
         if lobe.transmission == 1.0:  # the level does not affect glass
             return
         if is_constant(level) and is_constant(lobe.ior) and 0 < level:
@@ -332,13 +343,16 @@ class Reader:
                 passed = g.power(lobe.coat_colour, 0.573)
                 lobe.emission = g.multiply(lobe.emission, g.add(g.multiply(passed, lobe.coat), g.subtract(1.0, lobe.coat)))
             if self.normal(leaf, "Coat Normal") is not None:
-                self.say("Coat Normal is not carried: the coat follows the surface")
+                self.say("Coat Normal is not carried: the coat follows the surface; "
+                         "unlink Coat > Normal")
         weight = self.get(leaf, "Sheen Weight")
         if weight != 0.0:
             self.say("what lies below its sheen is dimmed for the directions of light and view alike, in Cycles for that of "
-                     "the view alone")
+                     "the view alone; "
+                     "lower Sheen > Weight to see less of the difference")
             if lobe.coat != 0.0:
-                self.say("its sheen lies below its coat, in Cycles above it")
+                self.say("its sheen lies below its coat, in Cycles above it; "
+                         "set Sheen > Weight or Coat > Weight to 0")
             lobe.sheen = g.multiply(self.get(leaf, "Sheen Tint"), weight)
             lobe.sheen_roughness = self.get(leaf, "Sheen Roughness")
 

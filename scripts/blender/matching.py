@@ -57,7 +57,8 @@ class _Match:
             elif leaf.type == "EMISSION":
                 shining.append((weight, self.reader.get(leaf, "Color"), self.reader.get(leaf, "Strength")))
             elif leaf.type in {"HOLDOUT", "BSDF_RAY_PORTAL"}:
-                self.say(f"its {leaf.node.bl_label} shader is not carried: it is black")
+                self.say(f"its {leaf.node.bl_label} shader is not carried: it is black; "
+                         "mask the object in the compositor by its cryptomatte")
             else:
                 lobe, part = self.reader.lobe(leaf), weight
                 if leaf.type == "BSDF_PRINCIPLED":
@@ -74,7 +75,8 @@ class _Match:
         alpha, within = self._alpha(clear, lobes)
         if clear and any(lobe.transmission == 1.0 and not lobe.thin for lobe, _ in lobes):
             self.say("glass that is partly transparent is approximated: light that came in through its transparent "
-                     "share is not within the glass")
+                     "share is not within the glass; "
+                     "cut holes into the mesh instead")
         found = self._merge([(lobe, within(part)) for lobe, part in lobes], kinds)
         found = Matched(**{f.name: getattr(found, f.name) for f in fields(Lobe)}, alpha=alpha)
         found.emission, found.strength = self._emission([(within(w), c, s) for w, c, s in shining])
@@ -107,7 +109,8 @@ class _Match:
             for weight, tint in clear:
                 passed = g.add(passed, g.multiply(weight, tint))
             if not (is_constant(passed) and len(set(passed)) == 1):
-                self.say("the colour of its Transparent shader is not carried beside other shaders: its mean is taken")
+                self.say("the colour of its Transparent shader is not carried beside other shaders: its mean is taken; "
+                         "make that colour grey, or use glass of IOR 1")
             alpha = g.clamp(g.subtract(1.0, g.mean(passed)))
 
         def within(part):
@@ -134,7 +137,8 @@ class _Match:
         for _, part in lobes:
             whole = g.add(whole, part)
         if is_constant(whole) and whole > 1 + 1e-5:
-            self.say(f"its shaders add up to {whole:.3g} times the light they receive: colours are held within 1")
+            self.say(f"its shaders add up to {whole:.3g} times the light they receive: colours are held within 1; "
+                     "use a Mix Shader instead of an Add Shader")
         if self.adds_up or (is_constant(whole) and abs(whole - 1) < 1e-6):
             whole = 1.0
         parts = [g.divide(part, whole) for _, part in lobes]
@@ -160,13 +164,16 @@ class _Match:
         if not found:
             return None
         if any(lobe.subsurface is None and lobe.sheet != 0.0 for lobe in lobes):
-            self.say("subsurface scattering is not carried beside Translucent shaders: its light leaves where it arrives")
+            self.say("subsurface scattering is not carried beside Translucent shaders: its light leaves where it arrives; "
+                     "give both a material of their own")
             return None
         if any(lobe.transmission != 0.0 for lobe in lobes):
-            self.say("subsurface scattering is not carried beside transmission: its light leaves where it arrives")
+            self.say("subsurface scattering is not carried beside transmission: its light leaves where it arrives; "
+                     "give both a material of their own")
             return None
         if any(other != found[0] for other in found):
-            self.say("its mixed shaders differ in their subsurface scattering: that of the first is taken")
+            self.say("its mixed shaders differ in their subsurface scattering: that of the first is taken; "
+                     "give them equal Radius, Scale, IOR and Anisotropy")
         return found[0]
 
     @staticmethod
@@ -206,7 +213,8 @@ class _Match:
             colour = g.multiply(colour, part)
             under, gloss = (g.add(under, colour), gloss) if matt else (under, g.add(gloss, colour))
         if self._differ([lobe.roughness for lobe, _ in shiny]):
-            self.say("its mixed shaders differ in roughness: the mean is taken")
+            self.say("its mixed shaders differ in roughness: the mean is taken; "
+                     "give its Glossy shaders one Roughness")
         strongest = g.max_component(gloss)
         rest = g.subtract(1.0, strongest)
         first = shiny[0][0]
@@ -248,13 +256,15 @@ class _Match:
         if apart:
             apart += ["base colour"] * self._differ([lobe.base for lobe in lobes])
             self.say(f"its mixed shaders differ in {', '.join(sorted(apart))}: each is mixed for itself, which is "
-                     "exact only where one shader covers all")
+                     "exact only where one shader covers all; "
+                     "assign the shaders to faces as materials of their own, or use one Principled BSDF with textures")
         return found
 
     def _normal(self, lobes, parts):
         normals = [lobe.normal for lobe in lobes]
         if all(normal == normals[0] for normal in normals):
             return normals[0]
-        self.say("its mixed shaders differ in their normals: that of the strongest is taken")
+        self.say("its mixed shaders differ in their normals: that of the strongest is taken; "
+                 "link one normal to all of them")
         known = [part if is_constant(part) else 0.5 for part in parts]
         return normals[known.index(max(known))]

@@ -53,7 +53,8 @@ _OLD_STEEP_WARNING = (
     "viewer, which Blender 4.5 and caustique do not; use a Displace modifier to see the same in both")
 _OLD_BUMP_WARNING = (
     "Cycles before Blender 4.4 smooths its bumps over a pixel of the picture, which Blender 4.4 and caustique do not: in "
-    "small pictures they are steeper here")
+    "small pictures they are steeper here; "
+    "render larger, or use a Displace modifier")
 
 
 def matt(colour):
@@ -108,7 +109,8 @@ class Plan:
                 self.passes[name] = self._pack(name, parts, values)
         if self.passes:
             if any(n.type == "AMBIENT_OCCLUSION" and not n.only_local for t in self.graph.trees() for n in t.nodes):
-                self.say("its Ambient Occlusion node sees the object alone, without what stands around it")
+                self.say("its Ambient Occlusion node sees the object alone, without what stands around it; "
+                         "bake it to an image in Cycles, and link that image")
             made = standin.read_coordinates(self.graph) | self.graph.keep_alpha()
             self.passes = {name: value if value is None or is_constant(value) else made.get(value, value)
                            for name, value in self.passes.items()}
@@ -117,11 +119,12 @@ class Plan:
                                         for value in self.passes.values())
             names = [_DISPLAY_NAMES[n] for n in varying if n not in {"direction"}]
             self.say(f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} baked to images of {self.baker.size} x "
-                     f"{self.baker.size} texels, which blur finer detail: use image textures there, or a larger "
+                     f"{self.baker.size} texels, which blur finer detail; use image textures there, or a larger "
                      "--bake-size of export.py")
             for name in _MEANS:
                 if name in varying:
-                    self.say(f"{_DISPLAY_NAMES[name]} varies: its mean is taken")
+                    self.say(f"{_DISPLAY_NAMES[name]} varies: its mean is taken; "
+                             "use one value, or assign two materials to the faces")
 
     def _fold_constants(self, values):
         """Replace values that depend on constants alone by numbers."""
@@ -137,7 +140,7 @@ class Plan:
         self.bumped = self.graph.output.inputs["Displacement"].is_linked
         method = getattr(self.material, "displacement_method", "BUMP")
         if self.bumped and method != "BUMP":
-            self.say("true displacement is not carried: use a Displace modifier")
+            self.say("true displacement is not carried; use a Displace modifier")
         self.bumped = self.bumped and method != "DISPLACEMENT"
 
     def _direction(self, tangent):
@@ -202,11 +205,11 @@ class Plan:
         for name in varying:
             value = values[name]
             if name == "direction":
-                self.say("Anisotropy has no direction that is not baked: the highlight is round, leave out --no-bake")
+                self.say("Anisotropy has no direction that is not baked: the highlight is round; leave out --no-bake")
                 values["anisotropy"] = 0.0
                 continue
             source = value.node.bl_label if isinstance(value, bpy.types.NodeSocket) else "Displacement"
-            self.say(f"{_DISPLAY_NAMES[name]} comes from a {source} node and is not baked: "
+            self.say(f"{_DISPLAY_NAMES[name]} comes from a {source} node and is not baked; "
                      "leave out --no-bake to carry it")
             values[name] = self._unbaked(name)
 

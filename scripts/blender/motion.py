@@ -43,10 +43,12 @@ def warn_of_losses(scene, warn):
     pixels."""
     where = f'scene "{scene.name}"'
     if getattr(getattr(scene, "cycles", None), "rolling_shutter_type", "NONE") != "NONE":
-        warn(where, "its rolling shutter is not carried: all rows see the same time")
+        warn(where, "its rolling shutter is not carried: all rows see the same time; "
+                    "choose Motion Blur > Rolling Shutter > None to see the same in Cycles")
     heights = [point.location[1] for point in scene.render.motion_blur_shutter_curve.curves[0].points]
     if max(heights) - min(heights) > 1e-3:
-        warn(where, "its shutter curve is not carried: the shutter opens and closes at once")
+        warn(where, "its shutter curve is not carried: the shutter opens and closes at once; "
+                    "flatten Motion Blur > Shutter Curve to see the same in Cycles")
 
 
 def identity(instance):
@@ -131,7 +133,8 @@ class Shape:
         """Number the corners that are one vertex at all times."""
         self.labels = label_corners(self.mesh, self.points)
         if self.labels is None:
-            warn(f'object "{self.name}"', f"it has more than {_MAX_LABELS} vertices: " + _SHAPE_STANDS)
+            warn(f'object "{self.name}"', f"it has more than {_MAX_LABELS} vertices: {_SHAPE_STANDS}; split it "
+                 "into smaller objects")
 
     def at(self, time):
         """The points at a time, interpolated between samples."""

@@ -34,8 +34,8 @@ _MAX_EVEN_RATIO = 1.001
 STRETCHED = ("its scale is uneven, with which Cycles stretches normal maps: here they keep their slopes; apply the scale "
              "(Object > Apply > Scale) to see the same in both, or leave out --no-bake")
 _PATHS = "convert them to meshes (in the object's menu, or a Curve to Mesh node)"
-_LOST = {"CURVES": "hair curves are not carried: " + _PATHS,
-         "POINTCLOUD": "point clouds are not carried: convert them to meshes",
+_LOST = {"CURVES": "hair curves are not carried; " + _PATHS,
+         "POINTCLOUD": "point clouds are not carried; convert them to meshes",
          "GREASEPENCIL": "grease pencil is not carried: " + _PATHS,
          "GPENCIL": "grease pencil is not carried: " + _PATHS}
 
@@ -143,7 +143,8 @@ class FlatScene:
         if thing.type in _SOLID:
             data = self._mesh(instance, depsgraph)
         elif thing.type not in {"LIGHT", "CAMERA"}:
-            self._warn(f'object "{thing.name}"', f"objects of type {thing.type} are not carried")
+            self._warn(f'object "{thing.name}"', f"objects of type {thing.type} are not carried; "
+                                                 "convert it to a mesh (Object > Convert)")
             return None
         parent, matrix = instance.parent if instance.is_instance else None, instance.matrix_world.copy()
         key = motion.identity(instance)
@@ -191,7 +192,8 @@ class FlatScene:
         self.names[self.remove_later(mesh).name] = name
         lost = _remove_points_that_are_no_numbers(mesh)
         if lost:
-            self._warn(f'object "{thing.name}"', f"{lost} points of its shape are not numbers: they are left out")
+            self._warn(f'object "{thing.name}"', f"{lost} points of its shape are not numbers: they are left out; "
+                                                 "check its modifiers and nodes for divisions by zero")
         for index, slot in enumerate(thing.material_slots):
             if slot.link == "OBJECT" and index < len(mesh.materials):
                 mesh.materials[index] = slot.material and slot.material.original
@@ -207,14 +209,16 @@ class FlatScene:
 
     def _put(self, original, data, matrix, hidden, group, properties, key):
         if not all(math.isfinite(x) for row in matrix for x in row):
-            self._warn(f'object "{original.name}"', f"its place is not a number: {_OUT}")
+            self._warn(f'object "{original.name}"', f"its place is not a number: {_OUT}; "
+                                                    "check its constraints and drivers for divisions by zero")
             return
         at_frame = matrix
         if isinstance(data, bpy.types.Mesh):
             data, matrix = self._transformed(original, data, matrix)
         elif not motion.has_no_shear(matrix):
             what = "skews its picture" if isinstance(data, bpy.types.Camera) else "shears it"
-            self._warn(f'object "{original.name}"', f"the uneven scale of its parents {what} in Cycles, not here")
+            self._warn(f'object "{original.name}"', f"the uneven scale of its parents {what} in Cycles, not here; "
+                                                    "apply the scale of its parents (Object > Apply > Scale)")
         if isinstance(data, bpy.types.Camera):
             matrix = camera_export.without_scale(matrix)
         body = self.add(original.name, data, matrix, hidden, group)
@@ -231,7 +235,9 @@ class FlatScene:
             self.scene.camera = body
         rest = [ray for ray in hidden if ray != "camera"]
         if rest:
-            self._warn(self.where(body), f"it is hidden from {', '.join(rest)} rays in Cycles: here they meet it")
+            self._warn(self.where(body), f"it is hidden from {', '.join(rest)} rays in Cycles: here they meet it; "
+                                         "switch these rays on (Object > Visibility > Ray Visibility) to see the same "
+                                         "in Cycles")
 
     def _transformed(self, original, mesh, matrix):
         """The mesh and matrix of an object, with parts of the matrix applied to a copy of the mesh.
@@ -252,7 +258,8 @@ class FlatScene:
         where, made = f'object "{original.name}"', self._applied.setdefault(mesh.name, {})
         key = tuple(round(x, 5) for row in applied for x in row)
         if key not in made and rest != Matrix() and len(made) >= _MAX_SCALES:
-            self._warn(where, "its mesh has instances of many scales, and relief of one: it is as steep as without scale")
+            self._warn(where, "its mesh has instances of many scales, and relief of one: it is as steep as without scale; "
+                              "use at most 16 scales, or a Displace modifier")
             return mesh, matrix
         if stretched and not self._bakes:
             self._warn(where, STRETCHED)
@@ -309,17 +316,21 @@ class FlatScene:
             kind = system.settings.render_type
             if kind not in {"NONE", "OBJECT", "COLLECTION"}:
                 what = "hair" if kind == "PATH" else f"particles that render as {kind}"
-                self._warn(where, f'{what} of particle system "{system.name}" is not carried: convert it to a mesh')
+                self._warn(where, f'{what} of particle system "{system.name}" is not carried; convert it to a mesh')
         if thing.type != "LIGHT" and thing.is_holdout:
-            self._warn(where, "it is a holdout, which is not carried: it is seen as any other object")
+            self._warn(where, "it is a holdout, which is not carried: it is seen as any other object; "
+                              "mask it in the compositor by its cryptomatte")
         linking = thing.light_linking
         for kind, collection, what in (("light", linking.receiver_collection, "it shines on every object"),
                                        ("shadow", linking.blocker_collection, "every object blocks its light")):
             if collection is not None:
                 self._warn('light' + where[6:] if thing.type == "LIGHT" else where,
-                           f'its {kind} linking (collection "{collection.name}") is not carried: {what}')
+                           f'its {kind} linking (collection "{collection.name}") is not carried: {what}; '
+                                                            "render the objects on view layers of their own, and "
+                                                            "compose these")
         if getattr(thing.cycles, "use_adaptive_subdivision", False):
-            self._warn(where, "adaptive subdivision is not carried: the modifier's render level is taken")
+            self._warn(where, "adaptive subdivision is not carried: the modifier's render level is taken; "
+                              "raise the Subdivision modifier's Levels > Render")
 
 
 def _random_of_name(name):

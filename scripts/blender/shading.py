@@ -74,7 +74,8 @@ def medium(volume, where, warn):
             add(source(node.inputs[2]), weight * values["Fac"])
             return
         if any(v is None for v in values.values()):
-            warn(where, f"the {node.bl_label} node varies in space: it is not carried")
+            warn(where, f"the {node.bl_label} node varies in space: it is not carried; "
+                        "use constant values, or an OpenVDB file in a Volume object")
             return
         absorb = scatter = [0.0] * 3
         if node.type == "VOLUME_ABSORPTION":
@@ -86,11 +87,13 @@ def medium(volume, where, warn):
             scatter = [c * density for c in values["Color"]]
             absorb = [max(1 - c, 0) * max(1 - math.sqrt(t), 0) * density for c, t in zip(values["Color"], tint)]
             if values.get("Emission Strength") or values.get("Blackbody Intensity"):
-                warn(where, "the glow of the volume is not carried")
+                warn(where, "the glow of the volume is not carried; "
+                            "use an OpenVDB file in a Volume object, or put a glowing mesh inside")
         elif node.type == "VOLUME_COEFFICIENTS":
             absorb, scatter = values["Absorption Coefficients"], values["Scatter Coefficients"]
         else:
-            warn(where, f"the {node.bl_label} node is not a volume that can be carried")
+            warn(where, f"the {node.bl_label} node is not a volume that can be carried; "
+                        "use Volume Absorption, Volume Scatter or Principled Volume")
         g = values.get("Anisotropy", 0.0)
         for i in range(3):
             sigma_a[i] += weight * max(absorb[i], 0)
@@ -117,7 +120,8 @@ def finish(entry, material, closed, thickness, warn):
     clear = extensions.get("KHR_materials_transmission")
     if extensions.get("KHR_materials_volume") == {"thicknessFactor": 0}:  # a film, closed mesh or not
         if inside is not None:
-            warn(where, "its volume shader lies behind a film: it is not carried")
+            warn(where, "its volume shader lies behind a film: it is not carried; "
+                        "use a Glass or Principled BSDF as the surface")
         return
     if clear is not None and not closed and "KHR_materials_volume" not in extensions:
         warn(where, "transmissive, but on a mesh that is not closed: it stays a thin sheet that bends no light; close its "

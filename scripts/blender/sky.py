@@ -32,7 +32,8 @@ def sun(scene, undo, where, warn):
         return None
     node = discs[0]
     if len(discs) > 1 or node.inputs and node.inputs[0].is_linked:
-        warn(where, "the sun of its sky is baked with the sky, for its nodes turn it: caustics of it are soft")
+        warn(where, "the sun of its sky is baked with the sky, for its nodes turn it: caustics of it are soft; "
+                    "unlink the Vector of its Sky Texture, and turn the sun by Sun Rotation")
         return None
     up, turn = node.sun_elevation, node.sun_rotation
     toward = Vector((math.sin(turn) * math.cos(up), math.cos(turn) * math.cos(up), math.sin(up)))

@@ -198,7 +198,8 @@ def add_generated_coordinates(thing, mesh, say):
         if len(undeformed) == len(places):
             places = undeformed
         else:
-            say(f"Generated coordinates are those of the shape that {', '.join(m.name for m in deforming)} made")
+            say(f"Generated coordinates are those of the shape that {', '.join(m.name for m in deforming)} made; "
+                "apply these modifiers, or use UV coordinates")
     box = thing.data if thing.type == "MESH" else mesh
     centre, half = numpy.array(box.texspace_location), numpy.array(box.texspace_size)
     inside = (places - centre) / (2 * numpy.maximum(half, 1e-12)) + 0.5

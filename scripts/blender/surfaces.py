@@ -107,7 +107,8 @@ class Surfaces:
         channels, inside = surface.channels, surface.channels["subsurface"]
         if inside is not None and not closed:
             self.warn(f'material "{surface.material.name}"',
-                      "its subsurface scattering needs closed meshes: its light leaves where it arrives")
+                      "its subsurface scattering needs closed meshes: its light leaves where it arrives; "
+                      "close its holes (Mesh > Clean Up > Fill Holes)")
             if channels["base"] is not gltfmaterial.PLAIN:
                 channels = {**channels, "base": subsurface.at_surface(channels)}
             channels, inside = {**channels, "sheet": 0.0}, None

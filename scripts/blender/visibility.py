@@ -74,13 +74,17 @@ def _layer(scene, warn):
     layer, rendered = rendered_layer(scene), _rendered_layers(scene)
     rest = ", ".join(f'"{other.name}"' for other in rendered if other != layer)
     if rest:
-        warn(f'scene "{scene.name}"', f'of its view layers only "{layer.name}" is exported, not {rest}')
+        warn(f'scene "{scene.name}"', f'of its view layers only "{layer.name}" is exported, not {rest}; '
+                                                            "render by F12, which renders all view layers, or make "
+                                                            "another one active")
     parts = {"use_solid": "surfaces", "use_strand": "hair", "use_volumes": "volumes"}
     off = [name for switch, name in parts.items() if not getattr(layer, switch, True)]
     if off:
-        warn(f'view layer "{layer.name}"', f"its filter leaves out {', '.join(off)}, which is not carried: they are seen")
+        warn(f'view layer "{layer.name}"', f"its filter leaves out {', '.join(off)}, which is not carried: they are seen; "
+                                           "hide these objects in renders")
     if layer.material_override is not None:
-        warn(f'view layer "{layer.name}"', "its material override is not carried: objects keep their own materials")
+        warn(f'view layer "{layer.name}"', "its material override is not carried: objects keep their own materials; "
+                                           "assign the material to the objects")
     return layer
 
 
@@ -88,13 +92,14 @@ def _show_layers(branch, put, warn):
     for child in branch.children:
         put(child, "hide_viewport", False)  # the outliner's eye: renders ignore it
         if child.holdout and not child.exclude:
-            warn(f'collection "{child.name}"', "it is a holdout, which is not carried: its objects are seen")
+            warn(f'collection "{child.name}"', "it is a holdout, which is not carried: its objects are seen; "
+                                               "mask them in the compositor by their cryptomatte")
         _show_layers(child, put, warn)
 
 
 def _warn_of_viewport_nodes(thing, modifier, warn):
     if modifier.type == "NODES" and modifier.show_render and _asks_for_viewport(modifier.node_group, set()):
-        warn(f'object "{thing.name}"', f'its modifier "{modifier.name}" has an Is Viewport node, which says yes here: '
+        warn(f'object "{thing.name}"', f'its modifier "{modifier.name}" has an Is Viewport node, which says yes here; '
              "switch the node's use off before the export")
 
 

@@ -83,10 +83,12 @@ def box(thing, warn):
     where, data = f'object "{thing.name}"', thing.data
     library = openvdb()
     if not data.filepath:
-        warn(where, "volumes that vary in space are not carried")
+        warn(where, "volumes that vary in space are not carried; "
+                    "save them as an OpenVDB file, and import that as a Volume object")
         return None
     if library is None:
-        warn(where, "volumes are carried with Blender 4.4 and newer only: it is left out")
+        warn(where, "volumes are carried with Blender 4.4 and newer only: it is left out; "
+                    "use a newer Blender")
         return None
     data.grids.load()
     path = bpy.path.abspath(data.grids.frame_filepath or data.filepath)
@@ -95,14 +97,16 @@ def box(thing, warn):
     shaders = [s for s in leaves(source(output.inputs["Volume"])) if s.type in _KEPT] if output is not None else []
     names = {name for _, name in filter(None, map(_density, shaders)) if name}
     if len(names) != 1:
-        warn(where, "its density is not one grid times a number: it is left out")
+        warn(where, "its density is not one grid times a number: it is left out; "
+                    "link an Attribute node to Density, at most times a number")
         return None
     direction = thing.matrix_world.to_3x3() @ Vector((1, 1, 1)).normalized()
     scale = direction.length if data.render.space == "OBJECT" else 1.0
     try:
         volume = Volume(path, names.pop(), library, scale)
     except (KeyError, OSError, RuntimeError, TypeError, ValueError) as error:
-        warn(where, f"its grids cannot be read ({error}): it is left out")
+        warn(where, f"its grids cannot be read ({error}): it is left out; "
+                    "check the file (Object Data > OpenVDB File)")
         return None
     low, high = volume.corners()
     points = [[(low, high)[bit][axis] for axis, bit in enumerate(bits)] for bits in numpy.ndindex(2, 2, 2)]
@@ -151,10 +155,12 @@ def medium(material, volume, where, warn):
         values = {s.name: constant(s) for s in shader.inputs if s.type in {"VALUE", "RGBA"}}
         needed = {name for name in values if name in ("Color", "Anisotropy", "Absorption Color")}
         if density is None or not density[1] or any(values[name] is None for name in needed):
-            warn(where, f"the {shader.bl_label} node is not one grid times constants: it is not carried")
+            warn(where, f"the {shader.bl_label} node is not one grid times constants: it is not carried; "
+                        "link an Attribute node to Density, and unlink the other inputs")
             continue
         if source(tree) is not shader and source(tree).type == "MIX_SHADER":
-            warn(where, "the weights of mixed volumes are not carried")
+            warn(where, "the weights of mixed volumes are not carried; "
+                        "multiply Density by the weight instead")
         factor = density[0] / volume.scale
         absorb, scatter = [0.0] * 3, [0.0] * 3
         if shader.type == "VOLUME_ABSORPTION":
@@ -165,11 +171,13 @@ def medium(material, volume, where, warn):
             tint = values["Absorption Color"]
             absorb = [max(1 - c, 0) * max(1 - t ** 0.5, 0) * factor for c, t in zip(values["Color"], tint)]
             if volume.has(shader.inputs["Color Attribute"].default_value):
-                warn(where, "the colours of the volume's grid are not carried")
+                warn(where, "the colours of the volume's grid are not carried; "
+                            "clear Color Attribute, and choose one Color")
             own = _emission(shader, volume, where, warn)
             glow = own if glow is None or own is None else glow + own
         elif shader.type == "VOLUME_SCATTER" and getattr(shader, "phase", "HENYEY_GREENSTEIN") != "HENYEY_GREENSTEIN":
-            warn(where, "its phase function is taken for Henyey-Greenstein")
+            warn(where, "its phase function is taken for Henyey-Greenstein; "
+                        "choose Phase > Henyey-Greenstein to see the same in both")
         for i in range(3):
             sigma_a[i] += max(absorb[i], 0)
             sigma_s[i] += max(scatter[i], 0)
@@ -184,22 +192,26 @@ def _emission(shader, volume, where, warn):
     glow = numpy.zeros((*volume.density.shape, 3))
     strength, colour = _grid(shader.inputs["Emission Strength"]), constant(shader.inputs["Emission Color"])
     if strength is None or colour is None:
-        warn(where, "its emission is not one grid times constants: it is not carried")
+        warn(where, "its emission is not one grid times constants: it is not carried; "
+                    "link an Attribute node to Emission Strength, and unlink Emission Color")
     elif strength[0] > 0:
         by = volume.named(strength[1]) if strength[1] else inside[..., 0]
         if by is None:
-            warn(where, f'its grid "{strength[1]}" is missing, or its voxels differ: it does not glow')
+            warn(where, f'its grid "{strength[1]}" is missing, or its voxels differ: it does not glow; '
+                                                 "write all grids with voxels of one size")
         else:
             glow += strength[0] * numpy.asarray(by)[..., None] * colour
     intensity, tint = constant(shader.inputs["Blackbody Intensity"]), constant(shader.inputs["Blackbody Tint"])
     temperature = constant(shader.inputs["Temperature"])
     if None in (intensity, tint, temperature):
-        warn(where, "its blackbody is not constant: it is not carried")
+        warn(where, "its blackbody is not constant: it is not carried; "
+                    "unlink Blackbody Intensity, Blackbody Tint and Temperature")
     elif intensity > 0:
         name = shader.inputs["Temperature Attribute"].default_value
         by = volume.named(name) if volume.has(name) else inside[..., 0]
         if by is None:
-            warn(where, f'the voxels of its grid "{name}" differ: it does not glow')
+            warn(where, f'the voxels of its grid "{name}" differ: it does not glow; '
+                                                        "write all grids with voxels of one size")
         else:
             kelvins = temperature * numpy.maximum(by, 0)
             power = _BLACKBODY * ((1 - intensity) + intensity * kelvins.astype(float) ** 4) * (kelvins > 0)

@@ -48,9 +48,11 @@ def _world(scene, path, black, warn):
         with contextlib.ExitStack() as undo:
             disc = sky.sun(scene, undo, where, warn)
             said["environment"] = sky.bake_world(scene, path)
-        warn(where, f"its nodes are baked to {said['environment']['file']}")
+        warn(where, f"its nodes are baked to {said['environment']['file']}; "
+                    "keep that file beside the scene's file")
         if any(n.type == "LIGHT_PATH" and any(s.is_linked for s in n.outputs) for n in output.id_data.nodes):
-            warn(where, "it has a Light Path node, and is baked as cameras see it: so it lights the scene, too")
+            warn(where, "it has a Light Path node, and is baked as cameras see it: so it lights the scene, too; "
+                        "render over a transparent film, and compose the background")
     _add_visibility(world, said["environment"], where, warn)
     group = visibility.light_group(world, None, bpy.context.view_layer)
     if group:
@@ -67,7 +69,8 @@ def _add_visibility(world, environment, where, warn):
         environment["visible"] = {"camera": False}
         hidden.remove("camera")
     if hidden:
-        warn(where, f"it is hidden from {', '.join(rays[name] for name in hidden)} rays in Cycles: here they meet it")
+        warn(where, f"it is hidden from {', '.join(rays[name] for name in hidden)} rays in Cycles: here they meet it; "
+                    "switch these rays on (World > Ray Visibility) to see the same in Cycles")
 
 
 def _background(shader, path):

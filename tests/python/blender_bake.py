@@ -93,7 +93,7 @@ class Baked(Case):
     def test_a_baked_colour_is_that_of_the_position(self):
         self.stage.principled(Base_Color=self.stage.node("CombineXYZ", self.across(0), self.across(1), 0.25))
         entry, warnings = self.write()
-        remedy = "which blur finer detail: use image textures there, or a larger --bake-size of export.py"
+        remedy = "which blur finer detail; use image textures there, or a larger --bake-size of export.py"
         self.assertEqual(warnings, [f'material "tested": Base Color is baked to images of 64 x 64 texels, {remedy}'])
         info = entry["pbrMetallicRoughness"]["baseColorTexture"]
         self.assertEqual(info["texCoord"], 1)

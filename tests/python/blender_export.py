@@ -212,7 +212,7 @@ class Export(unittest.TestCase):
         tree.links.new(noise.outputs[0], shader.inputs["Base Color"])
         cube(material)
         warnings = export.write(self.path, bake_size=0)
-        self.assertEqual(warnings, ['material "n": Base Color comes from a Noise Texture node and is not baked: leave out '
+        self.assertEqual(warnings, ['material "n": Base Color comes from a Noise Texture node and is not baked; leave out '
                                     '--no-bake to carry it'])
 
     def test_camera(self):
@@ -409,7 +409,8 @@ class Export(unittest.TestCase):
         tree.links.new(texture.outputs["Color"], gamma.inputs["Color"])
         tree.links.new(gamma.outputs[0], background.inputs["Color"])
         document, warnings = self.write()
-        self.assertEqual(warnings, ['world "world": its nodes are baked to scene.environment.exr'])
+        self.assertEqual(warnings, ['world "world": its nodes are baked to scene.environment.exr; '
+                                    "keep that file beside the scene's file"])
         seen = pixels(os.path.join(self.folder.name, document["scenes"][0]["extras"]["caustique"]["environment"]["file"]))
         self.assertEqual(seen.shape, (512, 1024, 3))
         numpy.testing.assert_allclose(seen.reshape(32, 16, 64, 16, 3).mean((1, 3))[1:-1], self.gradient()[1:-1, :, :3] ** 2, atol=0.08)

@@ -92,7 +92,7 @@ class Geometry(cycles_comparison.CyclesComparison):
         self.silhouettes_agree(self.caustique(16), self.cycles(16))
         self.assertEqual(self.warnings, [])
         hair.render_type = "PATH"
-        lost = 'object "ground": hair of particle system "leaves" is not carried: convert it to a mesh'
+        lost = 'object "ground": hair of particle system "leaves" is not carried; convert it to a mesh'
         self.assertEqual(export.write(self.path), [lost])
 
     def instance_on_points(self, body, thing, material):

@@ -103,7 +103,8 @@ class Pictures(cycles_comparison.CyclesComparison):
         bpy.context.window.view_layer = self.scene.view_layers["second"]
         self.scene.view_layers["third"].use = False
         first = self.scene.view_layers[0]
-        said = 'scene "Scene": of its view layers only "{}" is exported, not "{}"'
+        said = 'scene "Scene": of its view layers only "{}" is exported, not "{}"; '
+        said += "render by F12, which renders all view layers, or make another one active"
         self.assertEqual(export.write(self.path), [said.format("second", first.name)])
         self.scene.view_layers["second"].use = False
         self.assertEqual(export.write(self.path), [])
