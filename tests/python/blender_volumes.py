@@ -82,11 +82,13 @@ class Volumes(support.Scratch):
         noise = stage.tree.nodes.new("ShaderNodeTexNoise")
         shader = next(n for n in stage.tree.nodes if n.type == "PRINCIPLED_VOLUME")
         link = stage.tree.links.new(noise.outputs[0], shader.inputs["Density"])
-        self.assertIn('object "cloud": its density is not one grid times a number: it is left out',
+        self.assertIn('object "cloud": its density is not one grid times a number: it is left out; link an Attribute node '
+                      'to Density, at most times a number',
                       export.write(self.path, bake_size=0))
         stage.tree.links.remove(link)
         stage.tree.links.new(noise.outputs[0], shader.inputs["Emission Strength"])
-        self.assertIn('material "tested": its emission is not one grid times constants: it is not carried',
+        self.assertIn('material "tested": its emission is not one grid times constants: it is not carried; link an '
+                      'Attribute node to Emission Strength, and unlink Emission Color',
                       export.write(self.path, bake_size=0))
         os.remove(bpy.data.volumes[0].filepath)
         bpy.data.volumes[0].grids.unload()
