@@ -20,6 +20,9 @@ pub const HOME_VARIABLE: &str = "CAUSTIQUE_HOME";
 /// above it.
 const PACKAGE: &str = "lib/caustique";
 
+/// Name of the program, on Windows without `.exe`.
+const PROGRAM: &str = "caustique";
+
 /// The paths to try for something installed at `relative` in the project's folder, nearest folder first.
 pub fn candidates(relative: &str) -> Vec<PathBuf> {
     project_folders().iter().map(|home| home.join(relative)).collect()
@@ -65,6 +68,20 @@ fn packages_of(file: &Path) -> Vec<PathBuf> {
         .filter(|folder| !system::is_shared(folder))
         .map(|folder| folder.join(PACKAGE))
         .collect()
+}
+
+/// The program of the command line: the file with this code, or the program in the Python package that holds the module
+/// with this code; `None` if a program of another name uses the library.
+pub fn program() -> Option<PathBuf> {
+    own_file().and_then(|own| program_of(&own))
+}
+
+fn program_of(file: &Path) -> Option<PathBuf> {
+    if file.file_stem()? == PROGRAM {
+        return Some(file.to_owned());
+    }
+    let packaged = file.with_file_name("bin").join(PROGRAM).with_extension(std::env::consts::EXE_EXTENSION);
+    packaged.is_file().then_some(packaged)
 }
 
 /// The folders that may be the project's, nearest first.
@@ -113,6 +130,17 @@ mod tests {
         assert_eq!(packages_of(Path::new("/opt/caustique/bin/caustique")), expected);
         let module = packages_of(Path::new("/site-packages/caustique/_native.abi3.so"));
         assert_eq!(module[0], Path::new("/site-packages/caustique/lib/caustique"));
+    }
+
+    #[test]
+    fn the_program_is_the_command_line_or_beside_the_module() {
+        let folder = tempfile::tempdir().unwrap();
+        let [module, program] = ["_native.abi3.so", "bin/caustique"].map(|name| folder.path().join(name));
+        assert_eq!(program_of(&program), Some(program.clone()));
+        assert_eq!(program_of(&module), None);
+        std::fs::create_dir(folder.path().join("bin")).unwrap();
+        std::fs::write(&program, "").unwrap();
+        assert_eq!(program_of(&module), Some(program));
     }
 
     #[test]

@@ -9,7 +9,7 @@
 
 set -euo pipefail
 
-extension=$(echo "$(cd "$1" && pwd)"/caustique-*-blender.zip)
+extension=$(echo "$(cd "$1" && pwd)"/caustique-*-linux-x86_64-blender.zip)
 script=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)/press_f12.py
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT

@@ -3,7 +3,8 @@
     python3 scripts/blender/package.py OUT.zip [--wheel WHEEL]
 
 The zip holds one folder: the add-on, the exporter that it runs in a second Blender process, and the licences. With a
-wheel of scripts/package.sh it also holds the program and its libraries, which Blender 4.2 and newer install with it.
+wheel of scripts/package.sh it also holds the program and its libraries, which Blender 4.2 and newer install with it,
+and is for the system of the wheel alone.
 """
 
 import argparse
@@ -15,6 +16,8 @@ _HERE = os.path.dirname(os.path.realpath(__file__))
 _ROOT = os.path.dirname(os.path.dirname(_HERE))
 _NAME = "caustique"
 _MANIFEST = "blender_manifest.toml"
+#: Blender's names of the platforms, by the begin of a wheel's platform.
+_PLATFORMS = {"manylinux": "linux-x64", "win": "windows-x64", "macosx": "macos-arm64"}
 _DAY = (1980, 1, 1, 0, 0, 0)  # a constant time, so that equal files give equal zips; the earliest that zip supports
 
 
@@ -45,7 +48,8 @@ def build(path, wheel=None):
         name = os.path.basename(wheel)
         manifest = f"{_NAME}/{_MANIFEST}"
         # A key after the table [permissions] would belong to that table.
-        files[manifest] = f'wheels = ["./wheels/{name}"]\n'.encode() + files[manifest]
+        begin = next(begin for begin in _PLATFORMS if name.split("-")[-1].startswith(begin))
+        files[manifest] = f'wheels = ["./wheels/{name}"]\nplatforms = ["{_PLATFORMS[begin]}"]\n'.encode() + files[manifest]
         files[f"{_NAME}/wheels/{name}"] = _read(wheel)
     with zipfile.ZipFile(path, "w") as archive:
         for name, data in files.items():

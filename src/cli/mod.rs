@@ -25,6 +25,7 @@ mod usage;
 mod warnings;
 
 use caustique::error::{Error, ErrorKind, Result};
+use caustique::scene::gltf::decode_for_program;
 use caustique::{processor, system};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::ffi::OsString;
@@ -70,6 +71,9 @@ enum Command {
     /// Print a description of the options of 'render' as JSON
     #[command(hide = true)]
     Options,
+    /// Decode compressed data that another process of the program sends on standard input
+    #[command(hide = true)]
+    Decode,
 }
 
 /// Makes the parser of the command line with all commands, arranged for the help.
@@ -126,11 +130,19 @@ pub fn main() -> ExitCode {
         Command::Completions(args) => shell::complete(&args, command_line()),
         Command::Man(args) => shell::man(&args, command_line()),
         Command::Options => shell::options(&command_line()),
+        Command::Decode => decode(),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => fail(&error),
     }
+}
+
+/// Decodes the data on standard input, see [`decode_for_program`].
+fn decode() -> Result<()> {
+    decode_for_program(std::io::stdin().lock(), std::io::stdout().lock()).map_err(|cause| {
+        Error::usage(format!("'decode' cannot read its input: {cause}")).hint("run 'caustique render' instead")
+    })
 }
 
 /// Parses the options of `caustique render` in `words`: the path of the scene, and options.

@@ -5,19 +5,17 @@ use std::io::{self, Read, Write};
 use std::os::fd::AsRawFd;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use crate::{Ending, Limits};
+use crate::{Ending, Helper, Limits, WAITING_FACTOR};
 
-/// Seconds after which a fork ends that does nothing, as a multiple of its limit of processor time. A fork has the
-/// locks of its parent's other threads: one that waits for such a lock would wait for ever.
-const WAITING_FACTOR: u32 = 10;
-
-/// Runs `work` in a fork of this process, and `read` here on what `work` writes. The fork ends when `read` returns.
+/// Runs `work` in a fork of this process, and `read` here on what `work` writes. The fork ends when `read` returns. No
+/// helper is needed.
 ///
 /// # Errors
 /// The system gives no pipe or no process.
 pub fn run<T>(
     limits: Limits,
     work: impl FnOnce(&mut dyn Write),
+    _helper: impl FnOnce() -> Option<Helper>,
     read: impl FnOnce(&mut dyn Read) -> T,
 ) -> io::Result<(T, Ending)> {
     let (mut reader, mut writer) = io::pipe()?;
@@ -123,7 +121,7 @@ mod tests {
             reader.read_to_end(&mut bytes).expect("it can be read");
             bytes
         };
-        run(LIMITS, work, read).expect("there is a process")
+        run(LIMITS, work, || None, read).expect("there is a process")
     }
 
     #[test]
@@ -159,7 +157,7 @@ mod tests {
             byte
         };
         let endless = |writer: &mut dyn Write| while writer.write_all(&[7; 4096]).is_ok() {};
-        assert_eq!(run(LIMITS, endless, first).expect("there is a process"), ([7], Ending::Finished));
+        assert_eq!(run(LIMITS, endless, || None, first).expect("there is a process"), ([7], Ending::Finished));
     }
 
     #[test]

@@ -12,7 +12,8 @@ use windows_sys::Win32::Storage::FileSystem::{
 };
 use windows_sys::Win32::System::IO::OVERLAPPED;
 use windows_sys::Win32::System::JobObjects::{
-    AssignProcessToJobObject, CreateJobObjectW, JOB_OBJECT_LIMIT_KILL_ON_JOB_CLOSE,
+    AssignProcessToJobObject, CreateJobObjectW, JOB_OBJECT_LIMIT_DIE_ON_UNHANDLED_EXCEPTION,
+    JOB_OBJECT_LIMIT_KILL_ON_JOB_CLOSE, JOB_OBJECT_LIMIT_PROCESS_MEMORY, JOB_OBJECT_LIMIT_PROCESS_TIME,
     JOBOBJECT_EXTENDED_LIMIT_INFORMATION, JobObjectExtendedLimitInformation, SetInformationJobObject,
 };
 use windows_sys::Win32::System::ProcessStatus::{K32GetProcessMemoryInfo, PROCESS_MEMORY_COUNTERS};
@@ -74,6 +75,26 @@ impl Job {
     /// # Errors
     /// The system makes no job.
     pub fn new() -> io::Result<Job> {
+        Job::within(JOBOBJECT_EXTENDED_LIMIT_INFORMATION::default())
+    }
+
+    /// A job without processes. Each process may commit `bytes` of memory and take `seconds` of processor time. A fault
+    /// ends it without a window that waits for the user.
+    ///
+    /// # Errors
+    /// The system makes no job.
+    pub fn limited(bytes: u64, seconds: u32) -> io::Result<Job> {
+        let mut limits = JOBOBJECT_EXTENDED_LIMIT_INFORMATION::default();
+        limits.ProcessMemoryLimit = usize::try_from(bytes).unwrap_or(usize::MAX);
+        // A tick is 100 ns.
+        limits.BasicLimitInformation.PerProcessUserTimeLimit = i64::from(seconds) * 10_000_000;
+        limits.BasicLimitInformation.LimitFlags = JOB_OBJECT_LIMIT_PROCESS_MEMORY
+            | JOB_OBJECT_LIMIT_PROCESS_TIME
+            | JOB_OBJECT_LIMIT_DIE_ON_UNHANDLED_EXCEPTION;
+        Job::within(limits)
+    }
+
+    fn within(mut limits: JOBOBJECT_EXTENDED_LIMIT_INFORMATION) -> io::Result<Job> {
         // SAFETY: null: no attributes and no name. The new handle has no other owner.
         let job = unsafe {
             let handle = CreateJobObjectW(std::ptr::null(), std::ptr::null());
@@ -82,8 +103,7 @@ impl Job {
             }
             Job(OwnedHandle::from_raw_handle(handle))
         };
-        let mut limits = JOBOBJECT_EXTENDED_LIMIT_INFORMATION::default();
-        limits.BasicLimitInformation.LimitFlags = JOB_OBJECT_LIMIT_KILL_ON_JOB_CLOSE;
+        limits.BasicLimitInformation.LimitFlags |= JOB_OBJECT_LIMIT_KILL_ON_JOB_CLOSE;
         // SAFETY: `limits` is the structure that this class of information takes, with its size.
         let done = unsafe {
             SetInformationJobObject(

@@ -37,7 +37,7 @@ def _packaged():
     without that package."""
     package = importlib.util.find_spec("caustique")
     for folder in (package and package.submodule_search_locations) or ():
-        path = os.path.join(folder, "bin", "caustique")
+        path = os.path.join(folder, "bin", "caustique.exe" if os.name == "nt" else "caustique")
         if os.path.isfile(path):
             if not os.access(path, os.X_OK):
                 # Blender extracts wheels without permissions.

@@ -2,7 +2,7 @@
 //! the sizes in the data, and indexes without checks.
 
 use super::document::{Document, extension, get, named};
-use super::isolated::{self, Decoded, count_bytes, damaged};
+use super::isolated::{self, Compressed, Decoded, count_bytes, damaged};
 use crate::error::{Error, Result};
 use draco_oxide_core::attribute::{Attribute, ComponentDataType};
 use draco_oxide_core::types::PointIdx;
@@ -75,10 +75,12 @@ pub(super) fn decode(document: &mut Document) -> Result<()> {
     if jobs.is_empty() {
         return Ok(());
     }
-    let streams = jobs.iter().map(|job| document.view(job.view).map_err(|error| error.within(&job.place)));
-    let streams = streams.collect::<Result<Vec<&[u8]>>>()?;
-    let decoded = isolated::decode_each(bytes, jobs.len(), |index| decode_stream(streams[index], &jobs[index].targets));
-    for (job, decoded) in jobs.iter().zip(decoded?) {
+    let data = jobs.iter().map(|job| {
+        let stream = document.view(job.view).map_err(|error| error.within(&job.place))?;
+        Ok(Compressed::Draco(stream, job.targets.clone()))
+    });
+    let decoded = isolated::decode_each(bytes, &data.collect::<Result<Vec<_>>>()?)?;
+    for (job, decoded) in jobs.iter().zip(decoded) {
         let outcome = decoded.map_err(damaged).and_then(|bytes| apply(document, job, &bytes));
         outcome.map_err(|error| error.within(&job.place))?;
     }
@@ -142,7 +144,7 @@ fn job(
 }
 
 /// Decodes compressed data to a [`Layout`], triangles, and the attributes of `targets`.
-fn decode_stream(stream: &[u8], targets: &[(usize, usize)]) -> Decoded {
+pub(super) fn decode_stream(stream: &[u8], targets: &[(usize, usize)]) -> Decoded {
     let mesh = draco_oxide_decoder::decode_mesh(stream).map_err(|error| error.to_string())?;
     let faces: Vec<u32> = mesh.faces.iter().flatten().map(|point| usize::from(*point) as u32).collect();
     let points = faces.iter().max().map_or(0, |last| *last as usize + 1);

@@ -2,12 +2,14 @@
 //! fails ends its process.
 
 use super::document::Document;
-use super::fault;
+use super::{draco, fault, texture};
 use crate::error::{Error, Result};
-use crate::memory;
-use caustique_isolated::{Ending, Limits};
+use crate::{installed, memory};
+use caustique_isolated::{Ending, Helper, Limits};
+use serde::{Deserialize, Serialize};
 use std::io::{self, Read, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::process::Command;
 
 /// Bytes that a decoder may allocate besides its multiple of the decoded bytes: tables of fixed size.
 const BASE_BYTES: u64 = 256 << 20;
@@ -22,8 +24,32 @@ const BYTES_PER_SECOND: u64 = 1 << 18;
 /// allocate: both codecs reach about a thousand for constant data.
 const MAX_RATIO: u64 = 1 << 12;
 
+/// Command of the program that runs decoders, where a process cannot be forked.
+const COMMAND: &str = "decode";
+
 /// What a decoder has made, or why it failed.
 pub(super) type Decoded = std::result::Result<Vec<u8>, String>;
+
+/// Compressed data, and what their decoder needs to know.
+#[derive(Serialize, Deserialize)]
+pub(super) enum Compressed<'a> {
+    /// A mesh, and the attributes to decode, see [`draco::decode_stream`].
+    Draco(&'a [u8], Vec<(usize, usize)>),
+    /// A file of Basis Universal, and the size of its image.
+    Basis(&'a [u8], (u32, u32)),
+    /// A file of WebP.
+    WebP(&'a [u8]),
+}
+
+impl Compressed<'_> {
+    fn decode(&self) -> Decoded {
+        match self {
+            Compressed::Draco(stream, targets) => draco::decode_stream(stream, targets),
+            Compressed::Basis(file, size) => texture::decode_basis_file(file, *size),
+            Compressed::WebP(file) => texture::decode_webp_file(file),
+        }
+    }
+}
 
 /// The error about compressed data that cannot be decoded.
 pub(super) fn damaged(cause: impl std::fmt::Display) -> Error {
@@ -41,24 +67,23 @@ pub(super) fn count_bytes(document: &Document, bytes: u64, compressed: usize) ->
     error.map_err(|e| e.hint("render fewer or simpler meshes, or with more memory"))
 }
 
-/// Runs `decode` for `0..count` in one process of its own, up to the first failure. `bytes`: the size of all decoded
-/// data. Fewer results than `count` mean that the process has ended, for the reason in the last result.
+/// Decodes all data in one process of its own, up to the first failure. `bytes`: the size of all decoded data. Fewer
+/// results than data mean that the process has ended, for the reason in the last result.
 ///
 /// # Errors
 /// The process cannot be started.
-pub(super) fn decode_each(bytes: u64, count: usize, decode: impl Fn(usize) -> Decoded) -> Result<Vec<Decoded>> {
+pub(super) fn decode_each(bytes: u64, data: &[Compressed]) -> Result<Vec<Decoded>> {
+    let count = data.len();
     let most = BASE_BYTES.saturating_add(bytes.saturating_mul(BYTES_PER_BYTE));
     let free = memory::available().map_or(u64::MAX, |available| available.bytes);
     let seconds = BASE_SECONDS + bytes / BYTES_PER_SECOND;
     let limits = Limits { bytes: most.min(free), seconds: u32::try_from(seconds).unwrap_or(u32::MAX) };
-    let work = |writer: &mut dyn Write| {
-        for index in 0..count {
-            let decoded = catch_unwind(AssertUnwindSafe(|| decode(index)));
-            let decoded = decoded.unwrap_or_else(|_| Err("the decoder failed".into()));
-            if write(writer, &decoded).is_err() || decoded.is_err() {
-                return;
-            }
-        }
+    // Nobody reads on if writing fails.
+    let work = |writer: &mut dyn Write| drop(work(data, writer));
+    let helper = || {
+        let mut command = Command::new(installed::program()?);
+        command.arg(COMMAND);
+        Some(Helper { command, input: postcard::to_allocvec(data).ok()? })
     };
     let read = |reader: &mut dyn Read| {
         let mut all: Vec<Decoded> = Vec::new();
@@ -68,7 +93,7 @@ pub(super) fn decode_each(bytes: u64, count: usize, decode: impl Fn(usize) -> De
         }
         all
     };
-    let (mut all, ending) = caustique_isolated::run(limits, work, read)
+    let (mut all, ending) = caustique_isolated::run(limits, work, helper, read)
         .map_err(|error| super::fault("", format!("no process for its decoder can be started: {error}")))?;
     if all.len() < count && all.last().is_none_or(std::result::Result::is_ok) {
         all.push(Err(match ending {
@@ -80,13 +105,37 @@ pub(super) fn decode_each(bytes: u64, count: usize, decode: impl Fn(usize) -> De
     Ok(all)
 }
 
-/// Runs `decode` in a process of its own. `bytes`: the size of the decoded data.
+/// Decodes data in a process of their own. `bytes`: the size of the decoded data.
 ///
 /// # Errors
 /// The process cannot be started.
-pub(super) fn decode(bytes: u64, decode: impl Fn() -> Decoded) -> Result<Decoded> {
-    let all = decode_each(bytes, 1, |_| decode())?;
+pub(super) fn decode(bytes: u64, data: Compressed) -> Result<Decoded> {
+    let all = decode_each(bytes, &[data])?;
     Ok(all.into_iter().next().unwrap_or_else(|| Err("the decoder failed".into())))
+}
+
+/// Decodes the data that another process of the program sends, and writes the results for it.
+///
+/// # Errors
+/// The data are no such data, or nobody reads the results.
+pub fn decode_for_program(mut input: impl Read, mut output: impl Write) -> io::Result<()> {
+    let mut bytes = Vec::new();
+    input.read_to_end(&mut bytes)?;
+    let data: Vec<Compressed> = postcard::from_bytes(&bytes).map_err(io::Error::other)?;
+    work(&data, &mut output)
+}
+
+/// Decodes data up to the first failure, and writes the results.
+fn work(data: &[Compressed], writer: &mut dyn Write) -> io::Result<()> {
+    for data in data {
+        let decoded = catch_unwind(AssertUnwindSafe(|| data.decode()));
+        let decoded = decoded.unwrap_or_else(|_| Err("the decoder failed".into()));
+        write(writer, &decoded)?;
+        if decoded.is_err() {
+            break;
+        }
+    }
+    Ok(())
 }
 
 /// Writes a result: whether it is a success, its length, and its bytes.
@@ -110,4 +159,33 @@ fn read(reader: &mut dyn Read) -> io::Result<Decoded> {
         return Err(io::ErrorKind::UnexpectedEof.into());
     }
     Ok(if sound == [1] { Ok(bytes) } else { Err(String::from_utf8_lossy(&bytes).into_owned()) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+    use std::path::Path;
+
+    /// A program that decodes writes what a fork of this one writes, and takes nothing else than such data.
+    #[test]
+    fn data_are_decoded_for_another_process() {
+        let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus");
+        let [mesh, broken, basis, picture] =
+            ["draco/sequential", "draco/sequential-cut", "ktx2/uastc", "webp/lossless"]
+                .map(|name| fs::read(corpus.join(name)).expect("it can be read"));
+        let mesh = Compressed::Draco(&mesh, vec![(0, 0)]);
+        let data = [mesh, Compressed::WebP(&picture), Compressed::Basis(&basis, (4, 4)), Compressed::WebP(&broken)];
+        let forked = decode_each(1 << 10, &data).expect("there is a process");
+        let input = postcard::to_allocvec(data.as_slice()).expect("it has a form");
+        let mut output = Vec::new();
+        decode_for_program(input.as_slice(), &mut output).expect("it is sound");
+        let mut rest = output.as_slice();
+        let decoded: Vec<Decoded> = forked.iter().map(|_| read(&mut rest).expect("a result")).collect();
+        assert_eq!((&decoded, rest.len()), (&forked, 0));
+        assert_eq!(forked.iter().map(std::result::Result::is_ok).collect::<Vec<_>>(), [true, true, true, false]);
+        for damaged in [&input[..input.len() - 1], b"\xff\xff\xff\xff\x0f", b"\x01\x07"] {
+            assert!(decode_for_program(damaged, &mut Vec::new()).is_err(), "{damaged:?}");
+        }
+    }
 }

@@ -39,6 +39,7 @@ mod transform;
 mod uri;
 
 pub use files::{files, hash};
+pub use isolated::decode_for_program;
 pub use transform::affine;
 pub(super) use transform::{check_reach, is_finite, is_invertible};
 

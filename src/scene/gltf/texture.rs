@@ -1,7 +1,8 @@
 //! Reads textures. Each image is decoded once, and keeps the bit depth of its file.
 
 use super::document::{Document, get, named};
-use super::{fault, isolated};
+use super::fault;
+use super::isolated::{self, Compressed};
 use crate::error::{Error, ErrorKind, Result};
 use crate::texture::{Encoding, Integers, Texels, Texture, TextureRef, Wrap};
 use gltf::json::texture::{MagFilter, MinFilter, Sampler, WrappingMode};
@@ -219,20 +220,22 @@ fn decode_basis(document: &Document, bytes: &[u8]) -> Result<Decoded> {
     document
         .count_bytes(texels.saturating_mul(5), format_args!("{width} x {height} texels"))
         .map_err(|e| e.hint("save the image smaller, or render with more memory"))?;
-    let decode = || {
-        let transcode = || {
-            let image = basisu::Transcoder::new(bytes)?;
-            let texels = image.transcode(0, basisu::TargetFormat::Rgba32, basisu::DecodeFlags::NONE)?;
-            Ok((image.base_dimensions(), texels))
-        };
-        let (size, texels) = transcode().map_err(|e: basisu::Error| format!("{e:?}"))?;
-        if size == (width, height) { Ok(texels) } else { Err(OTHER_SIZE.into()) }
-    };
-    let texels = isolated::decode(4 * texels, decode)?.map_err(broken)?;
+    let texels = isolated::decode(4 * texels, Compressed::Basis(bytes, (width, height)))?.map_err(broken)?;
     if texels.len() as u64 != 4 * u64::from(width) * u64::from(height) {
         return Err(broken(OTHER_SIZE.into()));
     }
     Ok(Decoded { width, height, channels: 4, data: Arc::new(Integers::Bytes(texels)) })
+}
+
+/// Decodes a file of Basis Universal to texels of four bytes, if its image has the given size.
+pub(super) fn decode_basis_file(bytes: &[u8], expected: (u32, u32)) -> isolated::Decoded {
+    let transcode = || {
+        let image = basisu::Transcoder::new(bytes)?;
+        let texels = image.transcode(0, basisu::TargetFormat::Rgba32, basisu::DecodeFlags::NONE)?;
+        Ok((image.base_dimensions(), texels))
+    };
+    let (size, texels) = transcode().map_err(|e: basisu::Error| format!("{e:?}"))?;
+    if size == expected { Ok(texels) } else { Err(OTHER_SIZE.into()) }
 }
 
 /// The cause of an image of a size that its header does not say.
@@ -298,18 +301,22 @@ fn decode_webp(bytes: &[u8]) -> Result<std::result::Result<Decoded, String>> {
         return Ok(Err(format!("{width} x {height} texels are none or too many")));
     }
     let texels = u64::from(width) * u64::from(height);
-    let decode = || match image::load_from_memory_with_format(bytes, ImageFormat::WebP).map_err(|e| e.to_string())? {
-        DynamicImage::ImageRgb8(image) => Ok(image.into_raw()),
-        DynamicImage::ImageRgba8(image) => Ok(image.into_raw()),
-        _ => Err("its texels are not of 8 bits".into()),
-    };
-    let decoded = isolated::decode(4 * texels, decode)?;
+    let decoded = isolated::decode(4 * texels, Compressed::WebP(bytes))?;
     Ok(decoded.and_then(|data| {
         let channels = (data.len() as u64 / texels) as u8;
         let fits = matches!(channels, 3 | 4) && data.len() as u64 == texels * u64::from(channels);
         fits.then(|| Decoded { width, height, channels, data: Arc::new(Integers::Bytes(data)) })
             .ok_or_else(|| OTHER_SIZE.into())
     }))
+}
+
+/// Decodes a file of WebP to texels of three or four bytes.
+pub(super) fn decode_webp_file(bytes: &[u8]) -> isolated::Decoded {
+    match image::load_from_memory_with_format(bytes, ImageFormat::WebP).map_err(|e| e.to_string())? {
+        DynamicImage::ImageRgb8(image) => Ok(image.into_raw()),
+        DynamicImage::ImageRgba8(image) => Ok(image.into_raw()),
+        _ => Err("its texels are not of 8 bits".into()),
+    }
 }
 
 /// Checks that the decoded image fits in memory, because a few bytes can expand to a gigabyte. Returns whether the file
