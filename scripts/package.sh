@@ -48,7 +48,7 @@ windows-x86_64)
     linker='-C link-args=-static -C link-args=-Wl,--stack,8388608'
     ;;
 macos-aarch64)
-    triple=aarch64-apple-darwin cpu=apple-m1 tag=macosx_11_0_arm64
+    triple=aarch64-apple-darwin cpu=apple-m1 tag=macosx_13_0_arm64
     pip=(--platform macosx_14_0_arm64 --platform macosx_13_0_arm64 --platform macosx_12_0_arm64)
     ;;
 *) fail "unknown system '$system'" "one of: ${SYSTEMS[*]} all" ;;
@@ -63,7 +63,7 @@ PATH=$ROOT/.venv-package/bin:$PATH
 # The environment's flags replace those of .cargo/config.toml.
 export RUSTFLAGS="-C target-cpu=$cpu $linker ${CAUSTIQUE_RUSTFLAGS:-}" CARGO_TARGET_DIR=$out/build
 export CARGO_INCREMENTAL=0 CARGO_PROFILE_RELEASE_STRIP=symbols CARGO_PROFILE_RELEASE_DEBUG=none
-# The first macOS for Apple silicon. ONNX Runtime alone needs 14, and only networks need it.
+# The first macOS for Apple silicon. The wheel's tag is that of Embree; ONNX Runtime, which networks need, is for 14.
 export MACOSX_DEPLOYMENT_TARGET=11.0
 CAUSTIQUE_COMMIT=$(git rev-parse --short=12 HEAD 2>/dev/null || echo unknown)
 [ -z "$(git status --porcelain --untracked-files=no 2>/dev/null)" ] || CAUSTIQUE_COMMIT+=-modified

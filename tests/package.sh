@@ -13,34 +13,14 @@ ROOT=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work"
-passed=0 failed=0
-times=()
+# shellcheck source=tests/checks.sh
+. "$ROOT/tests/checks.sh"
 
-# check NAME COMMAND...: counts a command that must succeed, and shows its output if it does not
-check() {
-    local name=$1
-    shift
-    if "$@" >check.log 2>&1; then
-        passed=$((passed + 1))
-    else
-        failed=$((failed + 1))
-        printf 'FAILED %s\n' "$name"
-        cat check.log
-    fi
-}
-
-# no COMMAND...: succeeds if the command fails
-no() { ! "$@"; }
-# says PATTERN COMMAND...: succeeds if the command does, and prints a line that matches
-says() { "${@:2}" >said && { cat said && grep -Eq -- "$1" said; }; }
-holds() { local file; for file; do [ -s "$file" ] || { echo "$file: missing or empty" && return 1; }; done; }
 # uses_own FOLDER COMMAND...: succeeds if the program takes its three libraries from the folder
 uses_own() {
     "${@:2}" --version >said && cat said || return 1
     [ "$(grep -c ", $1/" said)" -eq 3 ] && grep -Eq '^caustique .*commit [0-9a-f]+' said
 }
-# first_picture NAME START: notes the time since START
-first_picture() { times+=("$(printf '%-8s %3d s from the download to the first picture' "$1" $((SECONDS - $2)))"); }
 
 for tool in cc gcc clang cargo rustc; do
     check "no $tool here" no command -v "$tool"
@@ -74,7 +54,7 @@ check 'tarball: its own libraries after a move, by a link' uses_own "$work/elsew
 # The wheel.
 start=$SECONDS
 python3 -m venv venv
-wheel=$(echo "$packages"/caustique-*.whl)
+wheel=$(echo "$packages"/caustique-*_x86_64.whl)
 pip=(venv/bin/pip install -q --disable-pip-version-check)
 check 'wheel: pip install' "${pip[@]}" "$wheel"
 scene=$work/elsewhere/moved/share/caustique/scenes/pool.glb
@@ -100,6 +80,4 @@ check 'wheel: USD' says 'USD +[0-9]+\.' venv/bin/caustique doctor
 stage=$(find "$ROOT/scenes/usd" -name '*.usda' | sort | sed -n 1p)
 check 'wheel: a USD stage' venv/bin/caustique render "$stage" -o usd.exr "${small[@]}"
 
-printf '%s\n' "${times[@]}"
-printf '%d passed, %d failed\n' "$passed" "$failed"
-[ "$failed" -eq 0 ]
+report

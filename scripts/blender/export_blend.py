@@ -13,11 +13,14 @@ import glob
 import itertools
 import json
 import os
-import resource
-import select
 import shutil
 import sys
 import threading
+
+try:
+    import resource
+except ModuleNotFoundError:  # Windows
+    resource = None
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
@@ -47,8 +50,11 @@ def end(fault=None):
 
 def watch(seconds):
     """End the process after `seconds`, or when its standard input closes."""
-    if not select.select([sys.stdin.fileno()], [], [], seconds)[0]:
-        end(Fault(f"the export takes longer than {seconds} s", "simplify the scene, or set CAUSTIQUE_BLENDER_SECONDS to more"))
+    late = Fault(f"the export takes longer than {seconds} s", "simplify the scene, or set CAUSTIQUE_BLENDER_SECONDS to more")
+    clock = threading.Timer(seconds, end, [late])
+    clock.daemon = True
+    clock.start()
+    os.read(sys.stdin.fileno(), 1)  # `sys.stdin` has a lock that Python wants when it exits
     # Remove only a folder that the program made for this export.
     if os.path.basename(_HERE).startswith("caustique-blend-"):
         shutil.rmtree(_HERE, ignore_errors=True)
@@ -137,7 +143,7 @@ def main(arguments):
     parser.add_argument("--seconds", type=int, default=3600, help="time limit")
     parser.add_argument("--bytes", type=int, default=0, help="memory limit; 0 for none")
     given = parser.parse_args(arguments)
-    if given.bytes:
+    if given.bytes and resource is not None:
         resource.setrlimit(resource.RLIMIT_DATA, (given.bytes, given.bytes))
     threading.Thread(target=watch, args=(given.seconds,), daemon=True).start()
     try:

@@ -18,7 +18,7 @@ import sys
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
 from faults import Fault, text_of  # from this folder
-from guard import run_guarded
+from guard import limit_memory, run_guarded
 
 
 @contextlib.contextmanager
@@ -66,20 +66,23 @@ def main(given):
     parser.add_argument("--allow-outside", action="store_true",
                         help="let the stage name files outside its own folder")
     parser.add_argument("--guard", type=int, nargs=2, metavar=("SECONDS", "BYTES"), help=argparse.SUPPRESS)
-    given = parser.parse_args(given)
+    parser.add_argument("--confined", type=int, metavar="BYTES", help=argparse.SUPPRESS)
+    words, given = given, parser.parse_args(given)
     if given.arguments == bool(given.output):
         parser.error("give either -o OUT.glb or --arguments")
     if given.guard is None:
-        return _convert(given)
-    folder = os.path.dirname(os.path.abspath(__file__))
+        return _convert(given) if given.confined is None else _convert_confined(given)
+    script, guard = os.path.abspath(__file__), words.index("--guard")
+    words = [*words[:guard], *words[guard + 3:], "--confined", str(given.guard[1])]
     try:
-        return run_guarded(lambda: _convert_confined(given), folder, *given.guard)
+        return run_guarded([sys.executable, "-I", "-B", script, *words], os.path.dirname(script), *given.guard)
     except Fault as fault:
         return _print_error(fault.where, fault.fault, fault.hint)
 
 
 def _convert_confined(given):
     """Convert as `_convert`, in a process of its own. USD looks for layers beside the stage alone."""
+    limit_memory(given.confined)
     if not given.allow_outside:
         given.stage, given.output = (path and os.path.abspath(path) for path in (given.stage, given.output))
         # USD would also look in the current folder and in those of this variable.

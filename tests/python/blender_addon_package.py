@@ -4,11 +4,14 @@ import os
 import re
 import subprocess
 import sys
+import tomllib
 import unittest
+import zipfile
 
 import bpy
 
 import support
+import package
 from addon import ADDON, Installed, part_of_addon
 
 
@@ -22,11 +25,26 @@ class Package(Installed):
             self.assertEqual(found, before)
         self.assertNotIn(ADDON, sys.modules)
 
-    def test_blender_finds_no_fault_with_the_package(self):
+    def validate(self, extension):
         paths = (os.path.join(folder, "bl_pkg", "cli", "blender_ext.py") for folder in sys.path)
         tool = next(filter(os.path.isfile, paths))
-        done = subprocess.run([sys.executable, tool, "validate", self.zip], capture_output=True, text=True, check=False)
+        done = subprocess.run([sys.executable, tool, "validate", extension], capture_output=True, text=True, check=False)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+
+    def test_blender_finds_no_fault_with_the_package(self):
+        self.validate(self.zip)
+
+    def test_an_extension_is_for_the_system_of_its_wheel(self):
+        for tag, platform in (("manylinux_2_28_x86_64", "linux-x64"), ("win_amd64", "windows-x64"),
+                              ("macosx_13_0_arm64", "macos-arm64")):
+            with self.subTest(platform):
+                wheel, extension = self.dir / f"caustique-0.2.0-cp310-abi3-{tag}.whl", self.dir / f"{platform}.zip"
+                zipfile.ZipFile(wheel, "w").close()
+                package.build(extension, str(wheel))
+                self.validate(extension)
+                with zipfile.ZipFile(extension) as archive:
+                    manifest = tomllib.loads(archive.read("caustique/blender_manifest.toml").decode())
+                self.assertEqual((manifest["platforms"], manifest["wheels"]), ([platform], [f"./wheels/{wheel.name}"]))
 
     def test_versions_agree(self):
         addon = support.ROOT / "scripts" / "blender" / "caustique_addon"

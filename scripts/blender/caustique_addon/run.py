@@ -1,12 +1,11 @@
 """A running program: its progress, how to stop it, and its result."""
 
 import json
-import signal
 import subprocess
 import threading
 import time
 
-from . import fault, wording
+from . import fault, processes, wording
 
 _POLL_SECONDS = 0.05  # between two looks for the saved state
 _INTERRUPTED = 130  # exit code of a program that was interrupted and has written its picture
@@ -22,9 +21,8 @@ class Run:
         self._rest = []
         self._interrupted_at = None  # time of the interrupt
         self._ended = False  # by `stop`, after the grace period
-        # In a separate process group, else a Ctrl-C would reach it twice: from the terminal and from here.
         self._process = subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                                         stderr=subprocess.PIPE, text=True, errors="replace", start_new_session=True)
+                                         stderr=subprocess.PIPE, text=True, errors="replace", **processes.OWN_GROUP)
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
 
@@ -63,7 +61,7 @@ class Run:
         now = time.monotonic()
         if self._interrupted_at is None:
             self._interrupted_at = now
-            self._process.send_signal(signal.SIGINT)
+            self._process.send_signal(processes.INTERRUPT)
         elif now - self._interrupted_at > _GRACE_SECONDS:
             self._ended = True
             threading.Thread(target=self._end, args=(is_saved,), daemon=True).start()

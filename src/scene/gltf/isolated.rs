@@ -175,7 +175,7 @@ mod tests {
             ["draco/sequential", "draco/sequential-cut", "ktx2/uastc", "webp/lossless"]
                 .map(|name| fs::read(corpus.join(name)).expect("it can be read"));
         let mesh = Compressed::Draco(&mesh, vec![(0, 0)]);
-        let data = [mesh, Compressed::WebP(&picture), Compressed::Basis(&basis, (4, 4)), Compressed::WebP(&broken)];
+        let data = [mesh, Compressed::WebP(&picture), Compressed::Basis(&basis, (8, 4)), Compressed::WebP(&broken)];
         let forked = decode_each(1 << 10, &data).expect("there is a process");
         let input = postcard::to_allocvec(data.as_slice()).expect("it has a form");
         let mut output = Vec::new();
