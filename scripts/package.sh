@@ -45,7 +45,7 @@ windows-x86_64)
     triple=x86_64-pc-windows-gnu cpu=x86-64-v3 tag=win_amd64 pip=(--platform win_amd64)
     program=caustique.exe module=_native.pyd
     # As in .cargo/config.toml.
-    linker='-C link-args=-static -C link-args=-Wl,--stack,8388608'
+    linker='-C link-args=-static -C link-args=-Wl,--stack,8388608,-Bstatic'
     ;;
 macos-aarch64)
     triple=aarch64-apple-darwin cpu=apple-m1 tag=macosx_13_0_arm64

@@ -73,6 +73,15 @@ for scene in pool gems prism cornell; do
     differences+="\"$scene\": ${difference:-null}, "
     check "same picture: $scene" python3 -c 'import sys; sys.exit(not float(sys.argv[1]) < 1e-4)' "${difference:-1}"
 done
+for wheel in "$packages"/caustique-*-win_amd64.whl; do
+    [ -e "$wheel" ] || continue
+    python3 -m zipfile -e "$wheel" wheel
+    x86_64-w64-mingw32-objdump -p wheel/caustique/_native.pyd >imports
+    check 'the module needs Python' says 'DLL Name: python3\.dll' cat imports
+    check 'and no library of the compiler' no says 'DLL Name: lib' cat imports
+    check 'the program of the wheel' wine wheel/caustique/bin/caustique.exe info "$scenes/pool.glb"
+    rm -r wheel
+done
 check 'network' caustique render "$scenes/pool.glb" -o net.exr --model compact "${small[@]}"
 for i in 0 1; do check "shard $i" caustique render "$scenes/pool.glb" -o "shard$i.exr" --shard "$i/2" "${small[@]}"; done
 check 'merge' caustique merge shard0.exr shard1.exr -o merged.exr
