@@ -2,12 +2,15 @@
 
 import math
 
+import bpy  # noqa: F401  first, because it brings the others
+
+import bmesh
 import numpy
 import stage
 
 
-def brilliant(name, radius, material):
-    """A round brilliant of ideal proportions, its culet at the origin: 57 facets and a culet."""
+def brilliant(name, radius, material, at=(0, 0), turn=0.0):
+    """A round brilliant of ideal proportions, which lies at a point of the table and shows its table after a turn."""
     def ring(r, z, count, turned):
         turns = (numpy.arange(count) + turned) * 2 * math.pi / count
         return [(r * math.cos(t), r * math.sin(t), z) for t in turns]
@@ -31,7 +34,13 @@ def brilliant(name, radius, material):
     faces += [(upper + i, lower + i, lower + (i + 1) % 16, upper + (i + 1) % 16) for i in range(16)]
     scaled = [(x * radius, y * radius, z * radius) for x, y, z in points]
     thing = stage.mesh(name, scaled, faces, material)
-    thing.data.validate()
+    shape = bmesh.new()
+    shape.from_mesh(thing.data)
+    bmesh.ops.recalc_face_normals(shape, faces=shape.faces)
+    shape.to_mesh(thing.data)
+    shape.free()
+    # It rests on a facet of its pavilion.
+    thing.rotation_euler, thing.location = (math.atan(depth), 0, turn), (*at, 0.01 * radius)
     return thing
 
 
@@ -50,16 +59,14 @@ diamond = stage.glass("diamond", 2.417, abbe=55.3)
 sapphire = stage.principled("sapphire", abbe=72.0, Roughness=0.0, Transmission_Weight=1.0, IOR=1.77,
                             Base_Color=(0.12, 0.22, 0.85))
 gold = stage.principled("gold", Base_Color=(1.0, 0.77, 0.34), Metallic=1.0, Roughness=0.12)
-cloth = stage.principled("table", Base_Color=(0.32, 0.30, 0.28), Roughness=0.6)
-stage.mesh("table", [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [(0, 1, 2, 3)], cloth)
+cloth = stage.principled("table", Base_Color=(0.42, 0.39, 0.36), Roughness=0.6)
+stage.mesh("table", [(-4, -4, 0), (4, -4, 0), (4, 4, 0), (-4, 4, 0)], [(0, 1, 2, 3)], cloth)
 
 # One unit is a decimetre, so that the stones are some centimetres wide.
-large = brilliant("brilliant", 0.11, diamond)
-large.rotation_euler, large.location = (math.radians(127), 0, 0.35), (-0.16, -0.06, 0.108)
-blue = brilliant("sapphire", 0.06, sapphire)
-blue.rotation_euler, blue.location = (math.radians(127), 0, -0.9), (0.16, -0.14, 0.0595)
+brilliant("brilliant", 0.12, diamond, (-0.17, -0.05), 0.25)
+brilliant("sapphire", 0.07, sapphire, (0.2, -0.2), -0.5)
 stone = brilliant("stone of the ring", 0.045, diamond)
-stone.location = (0.14, 0.1, 0.238)
+stone.location, stone.rotation_euler = (0.14, 0.1, 0.238), (0.25, 0, 0)
 major, minor, across, round_ = 0.11, 0.016, 96, 24
 turns = [(2 * math.pi * i / across, 2 * math.pi * j / round_) for i in range(across) for j in range(round_)]
 ring = [((major + minor * math.cos(b)) * math.cos(a), minor * math.sin(b), (major + minor * math.cos(b)) * math.sin(a))
@@ -68,6 +75,6 @@ quads = [(i * round_ + j, i * round_ + (j + 1) % round_, (i + 1) % across * roun
           (i + 1) % across * round_ + j) for i in range(across) for j in range(round_)]
 stage.mesh("ring", ring, quads, gold, smooth=True).location = (0.14, 0.1, major + minor)
 stage.environment("soft boxes", soft_boxes())
-stage.lamp("spot light", "SPOT", 14, (-0.5, 0.5, 1.1), (-0.1, -0.05, 0), spot_size=0.5, shadow_soft_size=0.01)
-stage.camera((0.05, -0.95, 0.42), (0.0, -0.01, 0.1), 62)
+stage.lamp("spot light", "SPOT", 45, (-0.5, 0.5, 1.1), (-0.1, -0.05, 0), spot_size=0.5, shadow_soft_size=0.01)
+stage.camera((0.05, -0.95, 0.46), (0.0, -0.01, 0.115), 58)
 stage.save()

@@ -74,5 +74,5 @@ v = numpy.mgrid[:64, :128][0] / 63.0
 sky = numpy.dstack([0.25 + 0.25 * (1 - v), 0.45 + 0.15 * (1 - v), 0.85 + 0 * v]) * numpy.where(v > 0.5, 1.0, 0.3)[..., None]
 stage.environment("sky", sky)
 stage.lamp("sun", "SUN", 4.5, (1.6, 1.0, 2.6), angle=math.radians(0.53))
-stage.camera((0.25, -2.45, 0.75), (0.12, -0.75, -0.02), 34)
+stage.camera((0.30, -2.25, 0.72), (0.20, -0.90, 0.02), 36)
 stage.save()
