@@ -277,5 +277,37 @@ class Ends(Animation):
         self.assertEqual(self.processes[0].wait(timeout=20), 0)
 
 
+class Temporal(Installed):
+    def test_frames_are_finished_with_their_neighbours(self):
+        """The finished frames are those of `caustique finish`, and the kept ones are gone. Without vectors a warning."""
+        self.stage()
+        ball = bpy.data.objects["ball"]
+        for frame, x in ((1, -1), (4, 1)):
+            ball.location.x = x
+            ball.keyframe_insert("location", frame=frame)
+        self.scene.render.resolution_x, self.scene.render.resolution_y = 32, 24
+        self.settings.method, self.settings.iterations, self.settings.use_temporal = "path", 4, True
+        self.scene.frame_start, self.scene.frame_end = 1, 4
+        self.layer.use_pass_vector = True
+        self.render("frame", animation=True)
+        folder = self.dir / "temporal"
+        name = bpy.path.clean_name(self.layer.name)
+        wanted = {f"{name}.{frame:04}.{kind}" for frame in range(1, 5) for kind in ("exr", "png")}
+        self.assertEqual({path.name for path in folder.iterdir()}, wanted)
+        session = part_of_addon("session")
+        self.assertNotIn("motion vectors", "".join(session.warnings.get(self.scene.name, [])))
+        finished, alone = (channels(path) for path in (folder / f"{name}.0002.exr", self.dir / "frame-0002.exr"))
+        red = next(key for key in finished if key.endswith("Combined.R") or key == "R")
+        other = next(key for key in alone if key.endswith("Combined.R") or key == "R")
+        self.assertEqual(finished[red].shape, alone[other].shape)
+        self.assertTrue(numpy.isfinite(finished[red]).all())
+        self.assertTrue((finished[red] != alone[other]).any())
+        self.assertAlmostEqual(float(finished[red].mean() / alone[other].mean()), 1.0, delta=0.1)
+        self.layer.use_pass_vector = False
+        self.scene.frame_end = 1
+        self.render("again", animation=True)
+        self.assertIn("switch on Passes > Data > Vector", "".join(session.warnings[self.scene.name]))
+
+
 if __name__ == "__main__":
     unittest.main()

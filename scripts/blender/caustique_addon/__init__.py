@@ -8,7 +8,7 @@ panels show its messages in words of the interface (`wording`, `session`, `panel
 
 from . import (
     blender_panels, diagnosis, engine, handoff, material_panel, panels, persistent_data, preferences, presets_menu,
-    properties, scene_panels, viewport,
+    properties, scene_panels, temporal_finish, viewport,
 )
 
 # Blender before 4.2 reads this dictionary, later versions blender_manifest.toml.
@@ -23,7 +23,7 @@ bl_info = {
 }
 
 # Order matters: the engine and the panels use the properties.
-_PARTS = (preferences, properties, handoff, persistent_data, viewport, engine, diagnosis, presets_menu, panels, scene_panels,
+_PARTS = (preferences, properties, handoff, persistent_data, temporal_finish, viewport, engine, diagnosis, presets_menu, panels, scene_panels,
           material_panel, blender_panels)
 
 

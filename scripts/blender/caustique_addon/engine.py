@@ -14,7 +14,8 @@ import bpy
 import numpy
 
 from . import (
-    command, exr, handoff, ignored_settings, passes, persistent_data, preferences, program, resume, run, session, viewport,
+    command, exr, handoff, ignored_settings, passes, persistent_data, preferences, program, resume, run, session, temporal_finish,
+    viewport,
 )
 from .fault import Cancelled, fault_from_error
 
@@ -97,11 +98,16 @@ class Engine(bpy.types.RenderEngine):
         job = handoff.Job(depsgraph.scene, view_layer.name, frame, folder, chosen.exporter)
         self._export(job)
 
+        is_temporal = temporal_finish.applies(scene, self.is_animation)
+        chosen_layers, method = passes.layers(passes.wanted(view_layer)), command.method(scene.caustique_render)
+        if is_temporal:
+            chosen_layers = temporal_finish.layers(chosen_layers)
+            method = temporal_finish.with_seed_of_frame(method, scene.frame_current)
         output, preview = os.path.join(folder, "render.exr"), os.path.join(folder, "preview.exr")
         words = [path, "render", handoff.GLB, "--exr-naming", "blender", "--compression", "none",
-                 "--layers", passes.layers(passes.wanted(view_layer)), "--progress", "json", "--verbose",
+                 "--layers", chosen_layers, "--progress", "json", "--verbose",
                  *command.resolution(self.resolution_x, self.resolution_y), *command.threads(scene.render),
-                 *command.method(scene.caustique_render)]
+                 *method]
         saved = resume.Checkpoint([program.version(path), *words], folder)
         words += ["-o", output, *saved.options()]
         if _PREVIEW in program.options(path):
@@ -122,6 +128,8 @@ class Engine(bpy.types.RenderEngine):
         if not os.path.isfile(output):  # stopped before the first iteration
             raise Cancelled()
         self._deliver(exr.Picture(output), scene, view_layer.name, part)
+        if is_temporal and not stopped:
+            self._warn(scene, temporal_finish.keep(scene, view_layer, scene.frame_current, output, path))
 
     def _export(self, job):
         """Export a frame."""

@@ -100,7 +100,11 @@ class FinishPanel(Panel, bpy.types.Panel):
     bl_label = "Finish"
 
     def draw(self, context):
-        self._column().prop(context.scene.caustique_render, "finish", text="Denoiser")
+        column, settings = self._column(), context.scene.caustique_render
+        column.prop(settings, "finish", text="Denoiser")
+        value = column.row()
+        value.active = settings.finish != "off"
+        value.prop(settings, "use_temporal")
 
 
 class DiagnosisPanel(Panel, bpy.types.Panel):

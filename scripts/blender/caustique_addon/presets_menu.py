@@ -11,7 +11,7 @@ from . import properties
 #: Folder of users' presets, below the folders `presets` of Blender's scripts.
 SUBDIR = "caustique_render"
 _SUPPLIED = os.path.join(os.path.dirname(os.path.abspath(__file__)), "presets")
-_VALUES = ("method", "use_iterations", "iterations", "use_time", "time", "use_error", "error", "finish", "arguments",
+_VALUES = ("method", "use_iterations", "iterations", "use_time", "time", "use_error", "error", "finish", "use_temporal", "arguments",
            *(f"use_{name}" for name in properties.EFFECTS))
 
 

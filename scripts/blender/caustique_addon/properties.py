@@ -60,6 +60,11 @@ class Settings(bpy.types.PropertyGroup):
 
     finish: bpy.props.EnumProperty(
         name="Finish", items=FINISHES, default="auto", description="How noise is removed from the finished picture")
+    use_temporal: bpy.props.BoolProperty(
+        name="Finish Animations with Neighbours",
+        description="Finish each frame of an animation again, averaged with up to two frames before and after it, so that it "
+                    "flickers less. The EXRs and PNGs are written to the folder 'temporal' beside Blender's frames. Needs "
+                    "Passes > Data > Vector")
     arguments: bpy.props.StringProperty(
         name="Arguments", description="More options of the command line about the picture, such as --max-depth 8; "
                                       "they override the settings above")
