@@ -133,7 +133,7 @@ ratio=$(python3 - "$native" "$home/bin/caustique.exe" "$scenes/pool.glb" <<'PYTH
 import os, resource, statistics, subprocess, sys
 
 native, program, scene = sys.argv[1:]
-words = ["render", scene, "--width", "320", "--iterations", "24", "--threads", "1", "--no-finish", "--progress", "none"]
+words = ["render", scene, "--width", "320", "--iterations", "8", "--threads", "1", "--no-finish", "--progress", "none"]
 environment = {name: value for name, value in os.environ.items() if not name.startswith("CAUSTIQUE_")}
 
 
