@@ -102,6 +102,7 @@ impl Blender {
 /// The first program of this name in the absolute folders of the PATH: the current folder may hold files of other users.
 fn on_search_path(name: &str) -> Option<PathBuf> {
     let folders = std::env::var_os("PATH")?;
-    let mut paths = std::env::split_paths(&folders).filter(|folder| folder.is_absolute()).map(|it| it.join(name));
+    let file = Path::new(name).with_extension(std::env::consts::EXE_EXTENSION);
+    let mut paths = std::env::split_paths(&folders).filter(|folder| folder.is_absolute()).map(|it| it.join(&file));
     paths.find(|path| path.is_file())
 }
