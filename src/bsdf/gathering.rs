@@ -83,10 +83,7 @@ impl Gathering<'_> {
     #[inline]
     pub fn photons8(&self, wi: [f32x8; 3], cosine: f32x8) -> [f32x8; 3] {
         if matches!(self.kind, GatherCase::Nothing | GatherCase::Any) {
-            let [x, y, z] = wi.map(|c| c.to_array());
-            let cosine = cosine.to_array();
-            let f: [Rgb; 8] = std::array::from_fn(|k| self.photon(Vec3::new(x[k], y[k], z[k]), cosine[k]));
-            return std::array::from_fn(|c| f32x8::from(f.map(|f| f[c])));
+            return self.each(wi, cosine);
         }
         let (side, frame) = (self.side(), &self.shading.frame);
         let (cos_s, cos_g) = (dot(&wi, frame.n) * side, dot(&wi, self.shading.ng) * side);
@@ -100,12 +97,33 @@ impl Gathering<'_> {
                 let through = through.map_or(f32x8::ONE, |through| at.of(through)) * scale;
                 [through * factor.x, through * factor.y, through * factor.z]
             }
+            GatherCase::Facets(..) if self.mirrors_any(&wi, cos_g) => self.each(wi, cosine),
             GatherCase::Facets(layered, broad) => {
                 let i = [dot(&wi, frame.t), dot(&wi, frame.b), cos_s.fast_max(f32x8::splat(MIN_COSINE))];
                 self.facets(layered, *broad, &i, &at).map(|f| counts.blend(f * scale, f32x8::ZERO))
             }
             GatherCase::Nothing | GatherCase::Any => [f32x8::ZERO; 3],
         }
+    }
+
+    /// [`Gathering::photon`] for each of eight photons.
+    #[inline(never)]
+    fn each(&self, wi: [f32x8; 3], cosine: f32x8) -> [f32x8; 3] {
+        let ([x, y, z], cosine) = (wi.map(|c| c.to_array()), cosine.to_array());
+        let f: [Rgb; 8] = std::array::from_fn(|k| self.photon(Vec3::new(x[k], y[k], z[k]), cosine[k]));
+        std::array::from_fn(|c| f32x8::from(f.map(|f| f[c])))
+    }
+
+    /// Whether one of eight photons also reaches the surface from its mirror image, see [`Shading::second`]. `cos_g` are
+    /// their cosines with the geometric normal on the viewer's side.
+    #[inline]
+    fn mirrors_any(&self, wi: &[f32x8; 3], cos_g: f32x8) -> bool {
+        let (n, ng) = (self.shading.frame.n, self.shading.ng);
+        if n == ng {
+            return false;
+        }
+        let cos_mirrored = dot(wi, n) * self.side() - cos_g * (2.0 * n.dot(ng));
+        (cos_mirrored.cmp_gt(f32x8::ZERO) & cos_g.cmp_gt(f32x8::ZERO)).any()
     }
 
     /// [`Layered::eval`] for eight directions on the viewer's side.

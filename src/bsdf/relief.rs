@@ -1,37 +1,23 @@
-//! Corrections for surfaces with a normal map, which stands for facets with walls between them.
+//! Corrections where the shading normal leans away from the geometric one.
 //!
-//! *Diffuse* light is shadowed like light on microfacets whose roughness is the slope of the map \[Conty Estevez,
-//! Lecocq and Stein 2019, "A Microfacet-Based Shadowing Function to Solve the Bump Terminator Problem"\]. As in Cycles,
-//! it fades out smoothly where it grazes the surface.
+//! *Specular* light that would leave on the wrong side of the geometric plane is mirrored at it, as if facets had
+//! mirrors for walls. So white metal stays white and clear glass clear, also at the coarse corners of smooth-shaded
+//! meshes, as with displaced geometry, and the picture stays continuous where the mirror direction crosses the horizon.
+//! Light from `l` thus reaches a surface from two directions, `l` and its mirror image, if the shading normal faces both.
+//! (Cycles tilts the normal until its mirror direction grazes the surface. That loses up to 45 % of the light, and the
+//! tilt depends on the viewing direction, which photons do not know.)
 //!
-//! *Specular* light that a facet would reflect into the surface is mirrored out of it at the geometric plane, as if the
-//! walls were mirrors. So white metal stays white, as with displaced geometry, and the picture stays continuous where
-//! the mirror direction of a facet crosses the horizon. Light from `l` thus reaches a facet from two directions, `l`
-//! and its mirror image, if the facet faces both. (Cycles tilts the facet until its mirror direction grazes the
-//! surface. That loses up to 45 % of the light, and the tilt depends on the viewing direction, which photons do not
-//! know.)
+//! *Diffuse* light on a normal map, which stands for facets with walls between them, is shadowed like light on microfacets
+//! whose roughness is the slope of the map \[Conty Estevez, Lecocq and Stein 2019, "A Microfacet-Based Shadowing Function
+//! to Solve the Bump Terminator Problem"\]. As in Cycles, it fades out smoothly where it grazes the surface.
 
 use crate::math::Vec3;
 
-/// Light from one direction that reaches a facet of a normal map: how it is shadowed and mirrored.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Relief {
-    /// Share (0 to 1) of the light that is not shadowed, for diffuse reflection.
-    pub diffuse: f32,
-    /// Direction of the light, mirrored at the geometric plane (world space).
-    pub mirrored: Vec3,
-}
-
-impl Relief {
-    /// The effect of the map on light from `l` at a facet of normal `n`, on a surface of geometric normal `ng` and
-    /// interpolated normal `interpolated`. All vectors are unit vectors.
-    #[inline]
-    pub(super) fn new(l: Vec3, n: Vec3, interpolated: Vec3, ng: Vec3) -> Relief {
-        Relief {
-            diffuse: bump_shadowing(l.dot(interpolated) * l.dot(n).signum(), n.dot(interpolated)),
-            mirrored: mirrored(l, ng),
-        }
-    }
+/// Share (0 to 1) of diffuse light from `l` that a normal map does not shadow, at a facet of normal `n`, where
+/// `interpolated` is the normal without the map. All vectors are unit vectors.
+#[inline]
+pub(super) fn unshadowed(l: Vec3, n: Vec3, interpolated: Vec3) -> f32 {
+    bump_shadowing(l.dot(interpolated) * l.dot(n).signum(), n.dot(interpolated))
 }
 
 /// The direction `w` mirrored at the plane of unit normal `ng`.
@@ -74,6 +60,6 @@ mod tests {
     fn both_sides_have_the_same_shadowing() {
         let (n, interpolated) = (Vec3::new(0.6, 0.0, 0.8), Vec3::new(0.0, 0.1, 1.0).normalize());
         let l = Vec3::new(0.3, 0.4, 0.5).normalize();
-        assert_eq!(Relief::new(l, n, interpolated, Vec3::Z).diffuse, Relief::new(-l, n, interpolated, Vec3::Z).diffuse);
+        assert_eq!(unshadowed(l, n, interpolated), unshadowed(-l, n, interpolated));
     }
 }

@@ -5,12 +5,13 @@
 //! shading normal faces away from the light. If the viewing direction is on different sides, which happens on steep
 //! normal maps seen from the side, its opposite replaces it. So there are no black spots. Energy is conserved, because
 //! scattered directions on the wrong side of the surface are exactly the opposites of the directions that are left out.
-//! Light paths use Veach's adjoint \[1997, 5.3\]. Normal maps have further corrections (`relief.rs`).
+//! Light paths use Veach's adjoint \[1997, 5.3\]. Specular light that would leave on the wrong side of the surface is
+//! mirrored out of it, and normal maps shadow diffuse light (`relief.rs`).
 
 use super::coat::Coat;
 use super::facing::Facing;
 use super::layered::ViewTerms;
-use super::relief::{Relief, mirrored};
+use super::relief::{mirrored, unshadowed};
 use super::{Bsdf, BsdfSample, LobeSet, Transport};
 use crate::math::{Frame, Rgb, Vec2, Vec3};
 use bumpalo::Bump;
@@ -84,13 +85,21 @@ impl<'a> Shading<'a> {
         Facing { frame: self.frame, ng: self.ng, cos_og: self.cos_og, flipped: self.flipped }
     }
 
-    /// Corrections by the normal map for light from `l` (world space), and the second direction, in the shading frame,
-    /// from which specular light reaches the facet, if any. `None` without a normal map.
+    /// The second direction, in the shading frame, from which specular light from `l` (world space) reaches the surface,
+    /// if any: where the shading normal leans away from the geometric one.
     #[inline]
-    fn relief(&self, l: Vec3) -> Option<(Relief, Option<Vec3>)> {
-        let relief = Relief::new(l, self.frame.n, self.mapped?.interpolated_normal, self.ng);
-        let second = self.frame.to_local(relief.mirrored);
-        Some((relief, (self.may_be_specular() && second.z * l.dot(self.ng) > 0.0).then_some(second)))
+    fn second(&self, l: Vec3) -> Option<Vec3> {
+        if !self.may_be_specular() || self.frame.n == self.ng {
+            return None;
+        }
+        let second = self.frame.to_local(mirrored(l, self.ng));
+        (second.z * l.dot(self.ng) > 0.0).then_some(second)
+    }
+
+    /// Share (0 to 1) of diffuse light from `l` (world space) that the normal map does not shadow.
+    #[inline]
+    fn unshadowed(&self, l: Vec3) -> f32 {
+        self.mapped.map_or(1.0, |mapped| unshadowed(l, self.frame.n, mapped.interpolated_normal))
     }
 
     /// Whether the BSDF may have a specular lobe, not only diffuse reflection.
@@ -145,8 +154,10 @@ impl<'a> Shading<'a> {
     fn evaluate_base(&self, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
         let Some((i, cos_ig)) = self.local(wi, transport) else { return (Rgb::ZERO, 0.0) };
         let adjoint = cos_ig / self.cos_og;
-        if self.has_normal_map() {
-            let (value, pdf) = self.evaluate_relief(wi, i, transport, set);
+        let light = if transport == Transport::Radiance { wi } else { self.wo_world() };
+        let second = self.second(light);
+        if second.is_some() || self.has_normal_map() {
+            let (value, pdf) = self.evaluate_relief(i, second, self.unshadowed(light), transport, set);
             return (if transport == Transport::Importance { value * adjoint } else { value }, pdf);
         }
         let (f, pdf) = self.bsdf.evaluate_view(&self.view, i, transport, set);
@@ -157,15 +168,19 @@ impl<'a> Shading<'a> {
         (f * cosine, pdf)
     }
 
-    /// With a normal map: the BSDF times the cosine of light with the facet, summed over the directions from which
-    /// light reaches it, and the density of `wi`, which is `i` in the shading frame.
+    /// The BSDF times the cosine of light with the surface, summed over the directions from which light reaches it, `i`
+    /// and `second` if that exists, and the density of `i`. Diffuse light is multiplied by `diffuse`.
     #[inline(never)]
-    fn evaluate_relief(&self, wi: Vec3, i: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
+    fn evaluate_relief(
+        &self,
+        i: Vec3,
+        second: Option<Vec3>,
+        diffuse: f32,
+        transport: Transport,
+        set: LobeSet,
+    ) -> (Rgb, f32) {
         let radiance = transport == Transport::Radiance;
-        let Some((relief, second)) = self.relief(if radiance { wi } else { self.wo_world() }) else {
-            return (Rgb::ZERO, 0.0);
-        };
-        let (f, pdf) = self.bsdf.evaluate_dimmed(relief.diffuse, &self.view, i, transport, set);
+        let (f, pdf) = self.bsdf.evaluate_dimmed(diffuse, &self.view, i, transport, set);
         let first = f * if radiance { i.z.abs() } else { self.view.o.z };
         let Some(second) = second else { return (first, pdf) };
         let (f, more) = if radiance {
@@ -181,21 +196,17 @@ impl<'a> Shading<'a> {
         let Some((i, cos_ig)) = self.local(wi, transport) else { return Rgb::ZERO };
         let (bsdf, radiance) = (&self.bsdf, transport == Transport::Radiance);
         let cosine = if radiance { i.z.abs() } else { self.view.o.z };
-        let value = match self.relief(if radiance { wi } else { self.wo_world() }) {
-            None => bsdf.diffuse_value(1.0, &self.view, i) * cosine,
-            Some((relief, second)) => {
-                let first = bsdf.diffuse_value(relief.diffuse, &self.view, i) * cosine;
-                let mirrored = second.map_or(Rgb::ZERO, |second| {
-                    let value = if radiance {
-                        bsdf.diffuse_value(0.0, &self.view, second)
-                    } else {
-                        bsdf.diffuse_value(0.0, &bsdf.view_terms(second), i)
-                    };
-                    value * second.z.abs()
-                });
-                first + mirrored
-            }
-        };
+        let light = if radiance { wi } else { self.wo_world() };
+        let first = bsdf.diffuse_value(self.unshadowed(light), &self.view, i) * cosine;
+        let mirrored = self.second(light).map_or(Rgb::ZERO, |second| {
+            let value = if radiance {
+                bsdf.diffuse_value(0.0, &self.view, second)
+            } else {
+                bsdf.diffuse_value(0.0, &bsdf.view_terms(second), i)
+            };
+            value * second.z.abs()
+        });
+        let value = first + mirrored;
         if radiance { value } else { value * (cos_ig / self.cos_og) }
     }
 
@@ -233,7 +244,7 @@ impl<'a> Shading<'a> {
         let to = self.view.wo();
         let pdf = self.bsdf.pdf(i, to, transport, set);
         let light = if transport == Transport::Radiance { self.wo_world() } else { wi };
-        let Some((_, Some(second))) = self.relief(light) else { return pdf };
+        let Some(second) = self.second(light) else { return pdf };
         match transport {
             Transport::Radiance => pdf + self.bsdf.pdf(i, second, transport, set),
             Transport::Importance => 0.5 * (pdf + self.bsdf.pdf(second, to, transport, set)),
@@ -246,7 +257,7 @@ impl<'a> Shading<'a> {
     /// by its small cosine here would make it too bright.
     #[inline]
     pub fn gather(&self, wi: Vec3, cosine: f32, set: LobeSet) -> Rgb {
-        if self.has_normal_map() && cosine > 0.0 {
+        if cosine > 0.0 && (self.has_normal_map() || self.second(wi).is_some()) {
             return self.evaluate_cos(wi, Transport::Radiance, set).0 / cosine;
         }
         let (true, Some((i, _))) = (cosine > 0.0, self.local(wi, Transport::Radiance)) else {
@@ -316,8 +327,8 @@ impl<'a> Shading<'a> {
         if self.cos_og == 0.0 || (importance && self.flipped) {
             return None;
         }
-        // With a normal map, one of the two directions from which light reaches the facet is chosen.
-        let second = if importance { self.relief(self.wo_world()).and_then(|(_, second)| second) } else { None };
+        // One of the two directions from which light reaches the surface is chosen.
+        let second = if importance { self.second(self.wo_world()) } else { None };
         let Some(second) = second else { return self.sample_view(&self.view, 1.0, transport, set, u_lobe, u) };
         if u_lobe < 0.5 {
             return self.sample_view(&self.view, 0.5, transport, set, 2.0 * u_lobe, u);
@@ -326,7 +337,7 @@ impl<'a> Shading<'a> {
     }
 
     /// [`Shading::sample`] for the viewing direction of `view`, which has been chosen with the probability `chance`:
-    /// 1/2 if a normal map mirrors light, otherwise 1.
+    /// 1/2 if light is mirrored, otherwise 1.
     #[inline(always)]
     fn sample_view(
         &self,
@@ -344,7 +355,7 @@ impl<'a> Shading<'a> {
         if sample.wi.z * cos_ig < 0.0 {
             if importance {
                 (wi, cos_ig) = (-wi, -cos_ig);
-            } else if self.has_normal_map() && self.may_be_specular() {
+            } else if self.may_be_specular() {
                 (wi, cos_ig) = (mirrored(wi, self.ng), -cos_ig);
             }
         }
@@ -352,7 +363,8 @@ impl<'a> Shading<'a> {
             return None;
         }
         let local = std::mem::replace(&mut sample.wi, wi);
-        if self.has_normal_map() && sample.lobe != LobeSet::DELTA {
+        let mirrors = || if importance { chance < 1.0 } else { self.second(wi).is_some() };
+        if sample.lobe != LobeSet::DELTA && (self.has_normal_map() || mirrors()) {
             let (value, pdf_w) = self.evaluate_base(wi, transport, set);
             (sample.weight, sample.pdf_w) = (value / pdf_w, pdf_w);
             return (pdf_w > 0.0).then_some(sample);

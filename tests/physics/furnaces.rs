@@ -187,6 +187,29 @@ fn steep_normal_maps_look_the_same_by_all_methods() {
     same_by_all_methods(&build(description));
 }
 
+/// Coarse balls whose smooth shading leans up to 40 degrees away from their faces lose no light: alone under a white sky
+/// they are invisible, and above a floor they look the same by all methods.
+#[test]
+fn coarse_smooth_objects_have_no_dark_rims() {
+    let rough = |material| Material { roughness: 0.4.into(), ..material };
+    let balls = [glass(1.5), rough(glass(1.5)), mirror(), rough(mirror())];
+    let mut description = white_sky();
+    for (k, material) in balls.into_iter().enumerate() {
+        let center = Vec3::new((k % 2) as f32 - 0.5, 0.5, (k / 2) as f32 - 0.5);
+        add(&mut description, "ball", sphere(center, 0.4, 4), material);
+    }
+    description.cameras.push(look_at(DVec3::new(0.0, 1.2, 4.0), DVec3::new(0.0, 0.4, 0.0), 30.0));
+    let alone = build(description.clone());
+    let (mean, error) = mean_and_error(&means(&alone, Method::Path));
+    let critical = t_critical(ERROR_RATE, 1, SEEDS as f64 - 1.0);
+    println!("alone: {mean:.5} +- {error:.5}");
+    let passes = |expected: f64| (mean - expected).abs() < critical * error + 2e-3;
+    assert!(passes(1.0) && !passes(0.98), "{mean} +- {error}");
+    let floor = quad(Vec3::new(-1.5, 0.0, -1.5), Vec3::Z * 3.0, Vec3::X * 3.0);
+    add(&mut description, "floor", floor, matte(0.8, 0.0));
+    same_by_all_methods(&build(description));
+}
+
 /// Checks that all methods agree on the mean of a scene.
 fn same_by_all_methods(scene: &Scene) {
     let methods = [Method::Path, Method::Light, Method::Bdpt, Method::Vcm, Method::Sppm];
