@@ -83,16 +83,20 @@ pub fn render_loaded(mut request: Request, loaded: &Loaded, observer: &mut dyn O
     observer.accept(&loaded.scene)?;
     let Checked { camera, settings } = check::check(&request, &loaded.scene)?;
     let view = View::new(&loaded.scene, &camera);
+    let motion = MovingScene::new(&request, view, loaded.file.as_ref(), observer.stop())?;
+    // Lights may be dark at the frame, and the camera elsewhere.
+    let middle = motion.as_ref().map(|motion| motion.at(0.5)).transpose()?;
+    let seen = middle.as_ref().map_or(view, |(scene, camera)| View::new(scene, camera));
     let resumption = Resumption::read(&request, view.scene, &settings)?;
     let chosen = match &resumption.saved {
-        Some((head, _)) => choose::chosen_before(&request.picture.settings, head.candidate, settings, view),
-        None => choose::choose_for_render(&request, settings, view, observer)?,
+        Some((head, _)) => choose::chosen_before(&request.picture.settings, head.candidate, settings, seen),
+        None => choose::choose_for_render(&request, settings, seen, observer)?,
     };
-    let planned = plan::plan_render(&request, &chosen, view, &loaded.removed)?;
+    let planned = plan::plan_render(&request, &chosen, seen, &loaded.removed)?;
+    drop(middle);
     let prepared = prepare::prepare(&request, planned, view, observer)?;
     let mut facts = SceneFacts::new(view.scene, &request.picture.camera, &prepared.settings)?;
     facts.motion = motion_vectors(&request, view, loaded.file.as_ref(), &observer.stop())?;
-    let motion = MovingScene::new(&request, view, loaded.file.as_ref(), observer.stop())?;
     let stage = RenderInput::new(view.scene, view.camera, &prepared.settings)
         .with_motion(motion.as_ref().map(|motion| motion as &dyn Motion));
     let running = Running::start(&request, &stage, &chosen, prepared, resumption, facts.frame, observer)?;

@@ -54,10 +54,23 @@ impl<'a> RenderInput<'a> {
     /// # Errors
     /// The scene cannot be built at this moment.
     pub(in crate::render) fn at_iteration<T>(&self, i: u64, render: impl FnOnce(&RenderInput<'_>) -> T) -> Result<T> {
-        let Some(motion) = self.motion else { return Ok(render(self)) };
-        let (scene, camera) = motion.at(time_of_iteration(self.settings.seed, i))?;
+        self.at_time(time_of_iteration(self.settings.seed, i), render)
+    }
+
+    /// Measures the scene by `measure` in the middle of the shutter interval. The frame itself may be outside of it, and
+    /// lights may be dark there.
+    ///
+    /// # Errors
+    /// The scene cannot be built at this moment.
+    pub(in crate::render) fn in_the_middle<T>(&self, measure: impl FnOnce(&RenderInput<'_>) -> T) -> Result<T> {
+        self.at_time(0.5, measure)
+    }
+
+    fn at_time<T>(&self, time: f64, act: impl FnOnce(&RenderInput<'_>) -> T) -> Result<T> {
+        let Some(motion) = self.motion else { return Ok(act(self)) };
+        let (scene, camera) = motion.at(time)?;
         let input = RenderInput::new(&scene, &camera, &self.settings);
-        Ok(render(&input.with_motion(Some(motion))))
+        Ok(act(&input.with_motion(Some(motion))))
     }
 
     /// The settings of the render.

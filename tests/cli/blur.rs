@@ -47,6 +47,26 @@ fn the_shutter_decides_what_share_of_the_wall_is_seen() {
     assert!(still.read("a.exr").0.layers == still.read("b.exr").0.layers);
 }
 
+/// Bandwidths are measured while the shutter is open, not at the frame, where lights may be dark: here in fog, whose wall
+/// begins to shine at frame 3.
+#[test]
+fn bandwidths_are_those_of_the_open_shutter() {
+    let shines =
+        json!({"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": "/materials/0/emissiveFactor"}}});
+    let folder = folder(|document| {
+        document["animations"][0]["channels"][0]["target"] = shines.clone();
+        document["scenes"][0]["extras"]["caustique"]["medium"] = json!({"sigma_s": [0.5, 0.5, 0.5]});
+    });
+    let bandwidth = |arguments: &str| {
+        let fixed = "--method sppm --photons 300 --iterations 2 --layers all --overwrite -o fog.exr";
+        run(&folder, &format!("{arguments} {fixed}"));
+        values(&folder.read("fog.exr").0, "VolumeRadius1")[0][0]
+    };
+    let (dark, lit) = (bandwidth("--frames 2"), bandwidth("--frames 3"));
+    let open = bandwidth("--frames 2 --shutter 1.25,1.75");
+    assert!((open / lit - 1.0).abs() < 0.2 && dark < 0.2 * lit, "{open}, lit {lit}, dark {dark}");
+}
+
 /// The studio has no floor below moving objects, and says so.
 #[test]
 fn moving_objects_have_no_studio_floor() {

@@ -48,14 +48,16 @@ impl<'a> Session<'a> {
         let RenderInput { scene, settings, initial_media, .. } = input;
         settings.stop.forget_cuts();
         settings.stop.start_first_iteration(settings.time.map(|limit| limit - time.seconds));
-        let (integrator, pixels) = time.measure(|| {
+        let (integrator, measured) = time.measure(|| {
             let mut integrator = integrator(input);
-            let pixels = integrator.pixels(input);
-            (integrator, pixels)
+            let measured = input.in_the_middle(|input| integrator.pixels(input));
+            (integrator, measured)
         });
+        let (pixels, failure) =
+            measured.map_or_else(|failure| (input.empty_pixels(), Some(failure)), |pixels| (pixels, None));
         let stats = RenderStats::new(PhotonRecord::new(scene, settings, initial_media), time);
         let counters = Counters { stats, next: settings.shard.index, next_record: 1, pilot_seconds: time.seconds };
-        Session { input, integrator, pixels, counters, error: None, failure: None }
+        Session { input, integrator, pixels, counters, error: None, failure }
     }
 
     /// Continues a render from a saved state; `None` if the state is of another picture or method.
