@@ -79,9 +79,14 @@ fn check_relations(seeds: Range<u64>) {
 }
 
 /// Scenes of other seeds that have failed, or were wrongly reported as failures.
-const RELATIONS_FOUND: [(u64, Relation, Method); 1] = [(1089, Relation::SumOfLights, Method::Path)];
-const FORMS_FOUND: [(u64, Form, Method); 3] =
-    [(1062, Form::Glowing, Method::Bpm), (1165, Form::Punctual, Method::Light), (1214, Form::Bounce, Method::Path)];
+const RELATIONS_FOUND: [(u64, Relation, Method); 2] =
+    [(1089, Relation::SumOfLights, Method::Path), (2772, Relation::Later, Method::Sppm)];
+const FORMS_FOUND: [(u64, Form, Method); 4] = [
+    (1062, Form::Glowing, Method::Bpm),
+    (1165, Form::Punctual, Method::Light),
+    (1214, Form::Bounce, Method::Path),
+    (2401, Form::Punctual, Method::Light),
+];
 
 #[test]
 fn scenes_that_have_failed_hold() {

@@ -324,7 +324,12 @@ pub fn differences(a: &Set, b: &Set, tolerance: f64, significance: f64) -> Vec<D
             if apart.is_nan() || apart <= tolerance * scale {
                 return None;
             }
-            let probability = welch(apart, [of_a.1, of_b.1], [a.len(), b.len()]);
+            let t_test = welch(apart, [of_a.1, of_b.1], [a.len(), b.len()]);
+            let black = [(a, of_a, of_b.0), (b, of_b, of_a.0)].map(|(set, own, other)| {
+                let whole = mean_and_error(&column(set, MEANS - 3 + index % 3));
+                if own == (0.0, 0.0) { black_by_chance(other, whole) } else { 0.0 }
+            });
+            let probability = t_test.max(black[0]).max(black[1]);
             (probability < significance).then(|| Difference {
                 place: place(index),
                 index,
@@ -334,6 +339,13 @@ pub fn differences(a: &Set, b: &Set, tolerance: f64, significance: f64) -> Vec<D
             })
         })
         .collect()
+}
+
+/// Probability that no light path reaches a tile of this mean, in pictures of which the whole has the mean and error
+/// `whole`: the error tells how many light paths reach the whole picture, and the tile has its share of them.
+fn black_by_chance(tile: f64, (mean, error): (f64, f64)) -> f64 {
+    let paths = (mean / error).powi(2) * tile / (mean * f64::from(TILES * TILES));
+    if paths.is_nan() { 0.0 } else { (-paths).exp() }
 }
 
 fn place(index: usize) -> String {
