@@ -228,8 +228,9 @@ fn means(rendered: &Rendered, window: Option<[u32; 4]>) -> Vec<f64> {
 }
 
 /// Whether the method finds all light of the scene, often enough for a t test. Methods without photons find caustics
-/// seen through glass with a probability proportional to the solid angle of the light. For a small light a set may have
-/// no such sample, and then its estimated standard error is too small as well.
+/// seen through glass with a probability proportional to the solid angle of the light, and so does `vcm` in media, where
+/// it merges nothing. For a small light a set may have no such sample, and then its estimated standard error is too small
+/// as well.
 pub fn finds_all(world: &World, scene: &Scene, shot: &Shot) -> bool {
     let removed = Removed::default();
     let asked = PlanRequest {
@@ -240,7 +241,9 @@ pub fn finds_all(world: &World, scene: &Scene, shot: &Shot) -> bool {
         switches: Switches::default(),
         removed: &removed,
     };
-    let by_chance = matches!(shot.method, Method::Path | Method::Bdpt) && world.smallest_light() < SMALL_LIGHT;
+    let without_photons =
+        matches!(shot.method, Method::Path | Method::Bdpt) || (shot.method == Method::Vcm && scene.survey.scattering);
+    let by_chance = without_photons && world.smallest_light() < SMALL_LIGHT;
     let found = |e: &EffectPlan| !e.present || (e.simulated && !(by_chance && e.effect == Effect::Sds));
     scene.camera(&shot.view()).is_ok_and(|camera| Plan::new(scene, &camera, &asked).effects.iter().all(found))
 }
