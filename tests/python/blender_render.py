@@ -95,7 +95,7 @@ class Blend(support.Scratch):
         for path in ran:
             path.unlink(missing_ok=True)
         said = self.run_on("plan", self.path, "--width", 16, check=0).stdout
-        self.assertRegex(said, r'scene "Scene": Python in the file does not run \(Driver .*: use a simple expression')
+        self.assertRegex(said, r'scene "Scene": Python in the file does not run \(Driver .*; use a simple expression')
         self.assertEqual([path for path in ran if path.exists()], [])
         # The file would write these where scripts are allowed.
         bpy.ops.wm.open_mainfile(filepath=str(self.path), use_scripts=True)

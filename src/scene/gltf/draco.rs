@@ -1,35 +1,21 @@
 //! Geometry that Draco has compressed (KHR_draco_mesh_compression). Its decoder runs in a process of its own: it believes
 //! the sizes in the data, and indexes without checks.
 
+use super::codec::{BAD_ATTRIBUTE, COMPONENTS, Compressed, Layout};
 use super::document::{Document, extension, get, named};
-use super::isolated::{self, Compressed, Decoded, count_bytes, damaged};
+use super::isolated::{self, count_bytes, damaged};
 use crate::error::{Error, Result};
-use draco_oxide_core::attribute::{Attribute, ComponentDataType};
-use draco_oxide_core::types::PointIdx;
 use gltf::json::accessor::{ComponentType, GenericComponentType, Type};
 use gltf::json::buffer::View;
 use gltf::json::validation::{Checked, USize64};
 use gltf::json::{Accessor, Index};
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use std::collections::{BTreeMap, HashSet};
 
 const DRACO: &str = "KHR_draco_mesh_compression";
 
 /// Bytes that each element of an accessor counts as: those of a vector of four floats.
 const ELEMENT_BYTES: u64 = 16;
-
-/// The fault of an attribute of a kind that the decoder does not give.
-const BAD_ATTRIBUTE: &str = "an attribute is damaged";
-
-/// Types of components, by their index in a [`Layout`].
-const COMPONENTS: [ComponentType; 6] = [
-    ComponentType::I8,
-    ComponentType::U8,
-    ComponentType::I16,
-    ComponentType::U16,
-    ComponentType::U32,
-    ComponentType::F32,
-];
 
 /// Content of KHR_draco_mesh_compression.
 #[derive(Deserialize)]
@@ -52,17 +38,6 @@ struct Job {
     targets: Vec<(usize, usize)>,
     /// Index of the accessor that receives the vertices of the triangles.
     indices: Option<usize>,
-}
-
-/// The sizes of decoded data. The vertices of the triangles follow, 4 bytes each, and then the attributes.
-#[derive(Serialize, Deserialize)]
-struct Layout {
-    /// Number of vertices of all triangles.
-    corners: usize,
-    /// Number of points, the length of each attribute.
-    points: usize,
-    /// For each attribute, the index of its type in [`COMPONENTS`] and its number of components.
-    attributes: Vec<(usize, usize)>,
 }
 
 /// Decodes the primitives of a document that Draco has compressed. A primitive whose accessors have data of their own
@@ -143,48 +118,7 @@ fn job(
     Ok(Some((Job { mesh, primitive, place, view: draco.buffer_view, targets, indices }, bytes)))
 }
 
-/// Decodes compressed data to a [`Layout`], triangles, and the attributes of `targets`.
-pub(super) fn decode_stream(stream: &[u8], targets: &[(usize, usize)]) -> Decoded {
-    let mesh = draco_oxide_decoder::decode_mesh(stream).map_err(|error| error.to_string())?;
-    let faces: Vec<u32> = mesh.faces.iter().flatten().map(|point| usize::from(*point) as u32).collect();
-    let points = faces.iter().max().map_or(0, |last| *last as usize + 1);
-    let mut layout = Layout { corners: faces.len(), points, attributes: Vec::new() };
-    let mut data = bytemuck::cast_slice(&faces).to_vec();
-    for (_, id) in targets {
-        let attribute = mesh.attributes.iter().find(|attribute| attribute.get_id().as_usize() == *id);
-        let attribute = attribute.ok_or_else(|| format!("it has no attribute {id}"))?;
-        layout.attributes.push((append_values(attribute, points, &mut data)?, attribute.get_num_components()));
-    }
-    let mut bytes = postcard::to_allocvec(&layout).map_err(|error| error.to_string())?;
-    bytes.append(&mut data);
-    Ok(bytes)
-}
-
-/// Appends the values of an attribute for points `0..points` to `bytes`, and returns the index of their type.
-fn append_values(attribute: &Attribute, points: usize, bytes: &mut Vec<u8>) -> std::result::Result<usize, String> {
-    let component = match attribute.get_component_type() {
-        ComponentDataType::I8 => 0,
-        ComponentDataType::U8 => 1,
-        ComponentDataType::I16 => 2,
-        ComponentDataType::U16 => 3,
-        ComponentDataType::U32 => 4,
-        ComponentDataType::F32 => 5,
-        _ => return Err(BAD_ATTRIBUTE.into()),
-    };
-    let size = COMPONENTS[component].size() * attribute.get_num_components();
-    let unique = attribute.get_data_as_bytes();
-    for point in 0..points {
-        if point >= attribute.len() {
-            return Err(BAD_ATTRIBUTE.into());
-        }
-        let at = usize::from(attribute.get_unique_val_idx(PointIdx::from(point))) * size;
-        let value = at.checked_add(size).and_then(|end| unique.get(at..end));
-        bytes.extend_from_slice(value.ok_or(BAD_ATTRIBUTE)?);
-    }
-    Ok(component)
-}
-
-/// Gives the accessors of a primitive the data that [`decode_stream`] has made.
+/// Gives the accessors of a primitive the data that the decoder has made.
 fn apply(document: &mut Document, job: &Job, bytes: &[u8]) -> Result<()> {
     let broken = || damaged(BAD_ATTRIBUTE);
     let (layout, mut rest) = postcard::take_from_bytes::<Layout>(bytes).map_err(|_| broken())?;

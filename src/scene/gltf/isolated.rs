@@ -1,12 +1,12 @@
 //! Decoders of foreign data, run in a process of their own: they believe the sizes in a file, and an allocation that
 //! fails ends its process.
 
+use super::codec::{Compressed, Decoded};
 use super::document::Document;
-use super::{draco, fault, texture};
+use super::fault;
 use crate::error::{Error, Result};
 use crate::{installed, memory};
 use caustique_isolated::{Ending, Helper, Limits};
-use serde::{Deserialize, Serialize};
 use std::io::{self, Read, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::Command;
@@ -26,30 +26,6 @@ const MAX_RATIO: u64 = 1 << 12;
 
 /// Command of the program that runs decoders, where a process cannot be forked.
 const COMMAND: &str = "decode";
-
-/// What a decoder has made, or why it failed.
-pub(super) type Decoded = std::result::Result<Vec<u8>, String>;
-
-/// Compressed data, and what their decoder needs to know.
-#[derive(Serialize, Deserialize)]
-pub(super) enum Compressed<'a> {
-    /// A mesh, and the attributes to decode, see [`draco::decode_stream`].
-    Draco(&'a [u8], Vec<(usize, usize)>),
-    /// A file of Basis Universal, and the size of its image.
-    Basis(&'a [u8], (u32, u32)),
-    /// A file of WebP.
-    WebP(&'a [u8]),
-}
-
-impl Compressed<'_> {
-    fn decode(&self) -> Decoded {
-        match self {
-            Compressed::Draco(stream, targets) => draco::decode_stream(stream, targets),
-            Compressed::Basis(file, size) => texture::decode_basis_file(file, *size),
-            Compressed::WebP(file) => texture::decode_webp_file(file),
-        }
-    }
-}
 
 /// The error about compressed data that cannot be decoded.
 pub(super) fn damaged(cause: impl std::fmt::Display) -> Error {

@@ -13,6 +13,7 @@ mod accessor;
 mod animation;
 mod choice;
 mod clipping;
+mod codec;
 mod compressed;
 mod container;
 mod curve;

@@ -1,8 +1,9 @@
 //! Reads textures. Each image is decoded once, and keeps the bit depth of its file.
 
+use super::codec::{Compressed, OTHER_SIZE};
 use super::document::{Document, get, named};
 use super::fault;
-use super::isolated::{self, Compressed};
+use super::isolated;
 use crate::error::{Error, ErrorKind, Result};
 use crate::texture::{Encoding, Integers, Texels, Texture, TextureRef, Wrap};
 use gltf::json::texture::{MagFilter, MinFilter, Sampler, WrappingMode};
@@ -227,20 +228,6 @@ fn decode_basis(document: &Document, bytes: &[u8]) -> Result<Decoded> {
     Ok(Decoded { width, height, channels: 4, data: Arc::new(Integers::Bytes(texels)) })
 }
 
-/// Decodes a file of Basis Universal to texels of four bytes, if its image has the given size.
-pub(super) fn decode_basis_file(bytes: &[u8], expected: (u32, u32)) -> isolated::Decoded {
-    let transcode = || {
-        let image = basisu::Transcoder::new(bytes)?;
-        let texels = image.transcode(0, basisu::TargetFormat::Rgba32, basisu::DecodeFlags::NONE)?;
-        Ok((image.base_dimensions(), texels))
-    };
-    let (size, texels) = transcode().map_err(|e: basisu::Error| format!("{e:?}"))?;
-    if size == expected { Ok(texels) } else { Err(OTHER_SIZE.into()) }
-}
-
-/// The cause of an image of a size that its header does not say.
-const OTHER_SIZE: &str = "its size contradicts its header";
-
 /// The first bytes of a KTX2 file.
 const KTX2: &[u8] = b"\xabKTX 20\xbb\r\n\x1a\n";
 
@@ -308,15 +295,6 @@ fn decode_webp(bytes: &[u8]) -> Result<std::result::Result<Decoded, String>> {
         fits.then(|| Decoded { width, height, channels, data: Arc::new(Integers::Bytes(data)) })
             .ok_or_else(|| OTHER_SIZE.into())
     }))
-}
-
-/// Decodes a file of WebP to texels of three or four bytes.
-pub(super) fn decode_webp_file(bytes: &[u8]) -> isolated::Decoded {
-    match image::load_from_memory_with_format(bytes, ImageFormat::WebP).map_err(|e| e.to_string())? {
-        DynamicImage::ImageRgb8(image) => Ok(image.into_raw()),
-        DynamicImage::ImageRgba8(image) => Ok(image.into_raw()),
-        _ => Err("its texels are not of 8 bits".into()),
-    }
 }
 
 /// Checks that the decoded image fits in memory, because a few bytes can expand to a gigabyte. Returns whether the file
