@@ -74,8 +74,9 @@ def main(given):
         return _convert(given) if given.confined is None else _convert_confined(given)
     script, guard = os.path.abspath(__file__), words.index("--guard")
     words = [*words[:guard], *words[guard + 3:], "--confined", str(given.guard[1])]
+    python = [sys.executable, "-I", "-B", *(["-S"] if sys.flags.no_site else [])]
     try:
-        return run_guarded([sys.executable, "-I", "-B", script, *words], os.path.dirname(script), *given.guard)
+        return run_guarded([*python, script, *words], os.path.dirname(script), *given.guard)
     except Fault as fault:
         return _print_error(fault.where, fault.fault, fault.hint)
 
