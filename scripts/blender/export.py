@@ -253,7 +253,7 @@ def _warn_of_leaning(thing, flat, polished, warn):
         remedy = ("clear its own normals (Object Data > Geometry Data > Clear Custom Split Normals Data), or model the shape "
                   "that they pretend" if own else "mark these edges sharp, or bevel them with more segments")
         warn(flat.where(thing), f"its smooth shading leans by more than {limit} degrees from its faces on {share:.0%} of its "
-             f"area: there it is {'darker' if glass else 'brighter or darker'} than in Cycles; {remedy}")
+             f"area: there it is {'brighter' if glass else 'brighter or darker'} than in Cycles; {remedy}")
 
 
 def _polished(things):

@@ -265,7 +265,7 @@ class Named(cycles_comparison.CyclesComparison):
         self.assertEqual(export.write(self.path), [])
         body.data.shade_smooth()
         self.named('object "cube": its smooth shading leans by more than 25 degrees from its faces on 100% of its area: '
-                   "there it is darker than in Cycles")
+                   "there it is brighter than in Cycles")
         body.data.materials[0] = self.floor().data.materials[0]
         self.named("brighter or darker than in Cycles")
 
@@ -286,7 +286,7 @@ class Named(cycles_comparison.CyclesComparison):
             bpy.data.objects.remove(body)
 
     def test_normals_of_an_objects_own(self):
-        """Normals that lean one way by 13 degrees darken glass; a polished surface shows 20 degrees, a matt one none."""
+        """Normals that lean one way by 13 degrees change glass; a polished surface shows 20 degrees, a matt one none."""
         bpy.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32)
         body = bpy.context.object
         mesh = body.data

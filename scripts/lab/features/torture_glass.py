@@ -34,6 +34,15 @@ def _pool(stage, distance, scale, **inputs):
     stage.principled(**{**CLEAR, "IOR": 1.333, "Normal": relief, **inputs})
 
 
+def _sheet(stage, **inputs):
+    """An open sheet above the floor, which a bump of noise bends."""
+    _under_the_sky(stage)
+    stage.shape("plane")
+    stage.body.scale, stage.body.rotation_euler, stage.body.location = (2, 2, 1), (0, 0, 0), (0, 0, 0.3)
+    relief = stage.node("Bump", Distance=0.1, Height=stage.node("TexNoise", Scale=4.0).outputs[0])
+    stage.principled(**inputs, Normal=relief)
+
+
 @feature
 def water_bump(stage):
     _under_the_sky(stage)
@@ -49,21 +58,13 @@ def water_bump_fine(stage):
 @feature
 def water_bump_sheet(stage):
     """Water as an open sheet, as artists often model the sea."""
-    _under_the_sky(stage)
-    stage.shape("plane")
-    stage.body.scale, stage.body.rotation_euler, stage.body.location = (2, 2, 1), (0, 0, 0), (0, 0, 0.3)
-    relief = stage.node("Bump", Distance=0.1, Height=stage.node("TexNoise", Scale=4.0).outputs[0])
-    stage.principled(**CLEAR, IOR=1.333, Normal=relief)
+    _sheet(stage, **CLEAR, IOR=1.333)
 
 
 @feature
 def water_bump_opaque(stage):
     """The deep sea: dark, smooth, with a bump."""
-    _under_the_sky(stage)
-    stage.shape("plane")
-    stage.body.scale, stage.body.rotation_euler, stage.body.location = (2, 2, 1), (0, 0, 0), (0, 0, 0.3)
-    relief = stage.node("Bump", Distance=0.1, Height=stage.node("TexNoise", Scale=4.0).outputs[0])
-    stage.principled(Base_Color=(0.01, 0.05, 0.08), Roughness=0.05, IOR=1.333, Normal=relief)
+    _sheet(stage, Base_Color=(0.01, 0.05, 0.08), Roughness=0.05, IOR=1.333)
 
 
 def _bent(stage, slope, **inputs):
@@ -200,3 +201,11 @@ def own_normals_polished(stage):
 @feature
 def own_normals_glass(stage):
     _own_normals(stage, 13, **CLEAR)
+
+
+@feature
+def smooth_cube_glass(stage):
+    _under_the_sky(stage)
+    stage.shape("cube")
+    stage.body.data.shade_smooth()
+    stage.principled(**CLEAR)

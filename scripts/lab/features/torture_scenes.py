@@ -70,7 +70,7 @@ def point_size(stage):
 
 
 def _profile(stage, text):
-    """A point lamp that shines with an IES profile alone in a dim world."""
+    """A point lamp that shines with an IES profile."""
     lamp = _lamp(stage, "POINT", 150, (-1.5, -1.5, 2.5), shadow_soft_size=0.05)
     if bpy.app.version < (5, 1, 0):
         lamp.use_nodes = True
@@ -83,6 +83,13 @@ def _profile(stage, text):
     tree.links.new(emission.outputs[0], output.inputs[0])
 
 
+def _profile_alone(stage, text):
+    """A point lamp that shines with an IES profile, alone in a dim world."""
+    _profile(stage, text)
+    stage.background.inputs["Strength"].default_value = 0.05
+    bpy.data.objects.remove(stage.lamp)
+
+
 @feature
 def lamp_ies(stage):
     _profile(
@@ -93,25 +100,21 @@ def lamp_ies(stage):
 @feature
 def lamp_ies_uneven(stage):
     """A narrow beam, measured at uneven angles."""
-    _profile(
+    _profile_alone(
         stage,
         "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 7 1 1 2 0 0 0 1 1 100\n"
         "0 5 10 12.5 30 60 90\n0\n1000 2000 1500 100 50 5 0\n",
     )
-    stage.background.inputs["Strength"].default_value = 0.05
-    bpy.data.objects.remove(stage.lamp)
 
 
 @feature
 def lamp_ies_turned(stage):
     """A profile that is mirrored at a plane."""
-    _profile(
+    _profile_alone(
         stage,
         "IESNA:LM-63-2002\nTILT=NONE\n1 1000 1 4 3 1 2 0 0 0 1 1 100\n"
         "0 30 60 90\n0 90 180\n1000 800 300 10\n1000 400 100 10\n1000 200 10 5\n",
     )
-    stage.background.inputs["Strength"].default_value = 0.05
-    bpy.data.objects.remove(stage.lamp)
 
 
 @feature
