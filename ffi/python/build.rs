@@ -1,4 +1,4 @@
-//! Leaves the symbols of Python to the process that loads the module, which the linker of macOS must be told.
+//! Tells the linker of macOS that the process which loads the module has the symbols of Python.
 
 fn main() {
     pyo3_build_config::add_extension_module_link_args();

@@ -114,6 +114,12 @@ impl<'a> Shading<'a> {
         self.frame.to_world(self.view.wo())
     }
 
+    /// The direction of light: `wi` for radiance, and the viewing direction for importance (world space).
+    #[inline]
+    fn light(&self, wi: Vec3, transport: Transport) -> Vec3 {
+        if transport == Transport::Radiance { wi } else { self.wo_world() }
+    }
+
     #[inline]
     fn local(&self, w: Vec3, transport: Transport) -> Option<(Vec3, f32)> {
         self.facing().local(w, transport)
@@ -154,7 +160,7 @@ impl<'a> Shading<'a> {
     fn evaluate_base(&self, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
         let Some((i, cos_ig)) = self.local(wi, transport) else { return (Rgb::ZERO, 0.0) };
         let adjoint = cos_ig / self.cos_og;
-        let light = if transport == Transport::Radiance { wi } else { self.wo_world() };
+        let light = self.light(wi, transport);
         let second = self.second(light);
         if second.is_some() || self.has_normal_map() {
             let (value, pdf) = self.evaluate_relief(i, second, self.unshadowed(light), transport, set);
@@ -196,7 +202,7 @@ impl<'a> Shading<'a> {
         let Some((i, cos_ig)) = self.local(wi, transport) else { return Rgb::ZERO };
         let (bsdf, radiance) = (&self.bsdf, transport == Transport::Radiance);
         let cosine = if radiance { i.z.abs() } else { self.view.o.z };
-        let light = if radiance { wi } else { self.wo_world() };
+        let light = self.light(wi, transport);
         let first = bsdf.diffuse_value(self.unshadowed(light), &self.view, i) * cosine;
         let mirrored = self.second(light).map_or(Rgb::ZERO, |second| {
             let value = if radiance {
@@ -243,8 +249,7 @@ impl<'a> Shading<'a> {
         let Some((i, _)) = self.local(wi, transport.reversed()) else { return 0.0 };
         let to = self.view.wo();
         let pdf = self.bsdf.pdf(i, to, transport, set);
-        let light = if transport == Transport::Radiance { self.wo_world() } else { wi };
-        let Some(second) = self.second(light) else { return pdf };
+        let Some(second) = self.second(self.light(wi, transport.reversed())) else { return pdf };
         match transport {
             Transport::Radiance => pdf + self.bsdf.pdf(i, second, transport, set),
             Transport::Importance => 0.5 * (pdf + self.bsdf.pdf(second, to, transport, set)),

@@ -18,6 +18,7 @@ from . import session
 
 _REACH = 2  # frames on each side with which the program averages a frame
 _FOLDER = "temporal"
+_ENDS = bpy.app.handlers.render_complete, bpy.app.handlers.render_cancel, bpy.app.handlers.load_pre
 #: Layers that the finish needs, besides those of the passes.
 _LAYERS = ("all", "Motion", "Quarter")
 _VECTORS = ("the temporal finish has no motion vectors, and takes all that moves for another surface: switch on Passes > "
@@ -132,12 +133,12 @@ def end(*_):
 
 def register():
     """End the finish with the render."""
-    for handlers in (bpy.app.handlers.render_complete, bpy.app.handlers.render_cancel, bpy.app.handlers.load_pre):
+    for handlers in _ENDS:
         handlers.append(end)
 
 
 def unregister():
     """Stop that."""
-    for handlers in (bpy.app.handlers.render_complete, bpy.app.handlers.render_cancel, bpy.app.handlers.load_pre):
+    for handlers in _ENDS:
         handlers.remove(end)
     end()

@@ -7,7 +7,7 @@ use gltf::json::accessor::ComponentType;
 use image::{DynamicImage, ImageFormat};
 use serde::{Deserialize, Serialize};
 
-/// What a decoder has made, or why it failed.
+/// The decoded bytes, or the cause of the decoder's failure.
 pub(super) type Decoded = std::result::Result<Vec<u8>, String>;
 
 /// Compressed data, and what their decoder needs to know.
