@@ -185,6 +185,7 @@ else
 fi
 if [ "$SECONDS" -lt "$long_within" ]; then
     tests 'cargo test, long' "${rust[@]}" --ignored
+    tests 'Python, long' .venv-bpy/bin/python tests/python/timed.py discover -s tests/python -p 'long_blender_*.py'
     other_blenders CAUSTIQUE_LONG=1
     # Clippy's lint `incompatible_msrv` already names newer functions of the standard library.
     oldest=$(sed -n 's/^rust-version *= *"\([0-9.]*\)".*/\1/p' Cargo.toml | head -n 1)
