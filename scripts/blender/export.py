@@ -44,6 +44,7 @@ import export_guard as guard
 import lamp_pictures
 import lamp_profiles
 import lighting
+import linking
 import motion_gltf
 import objects
 import shading
@@ -111,6 +112,7 @@ def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None, onl
         _export_all_it_can(path, flat, warn)
     document, buffer = glb.read(path)
     bodies_of_nodes = [node.get("name") for node in document.get("nodes", [])]
+    linking.write(document, flat.links, bodies_of_nodes)
     _restore_names(document, flat.names)
     buffer = worn.finish(document, buffer, bodies)
     _warn_of_stretched_normals(document, warn)

@@ -88,6 +88,21 @@ impl PackedMesh {
     }
 }
 
+/// Light linking and shadow linking of an object: bits of the linkings of lights. Bit 0, that of lights without linking, is
+/// set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ObjectLinks {
+    /// Linkings whose light the object receives.
+    pub receives: u64,
+    /// Linkings whose light the object blocks.
+    pub blocks: u64,
+}
+
+impl ObjectLinks {
+    /// The object receives and blocks the light of all lights.
+    pub const ALL: ObjectLinks = ObjectLinks { receives: u64::MAX, blocks: u64::MAX };
+}
+
 /// A mesh placed in the scene.
 #[derive(Clone, Debug)]
 pub struct Instance {
@@ -103,6 +118,8 @@ pub struct Instance {
     pub hidden_from_camera: bool,
     /// Whether the picture shows only the shadows of other objects on the instance, as alpha, and their light.
     pub shadow_catcher: bool,
+    /// Lights whose light the instance receives and blocks.
+    pub links: ObjectLinks,
     /// Whether the place or the shape of the instance depends on the time while the shutter is open.
     pub moves: bool,
     /// Transform from local to world space; `None` if the mesh is in world space.

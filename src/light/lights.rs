@@ -10,6 +10,7 @@ use super::group::{Group, Groups};
 use super::kind::{
     Arrival, Emitter, EnvironmentLight, Light, LightRay, Owner, SceneParts, Selected, TriangleLight, VolumeLight,
 };
+use super::links::{LightLinks, Linking};
 use super::receiver::Receiver;
 use super::sampler::LightSampler;
 use super::sky::Sky;
@@ -39,6 +40,7 @@ pub struct Lights {
     sky: Sky,
     targets: CausticTargets,
     groups: Groups,
+    links: LightLinks,
 }
 
 impl Lights {
@@ -53,7 +55,8 @@ impl Lights {
     pub fn at_moment(&self, objects: Objects<'_>, others: Vec<Emitter>, sky: Sky, changed: bool) -> Lights {
         let targets = self.targets.at_moment(objects);
         if changed {
-            return Lights::build(objects, others, sky, targets).with_groups(self.groups.clone());
+            let lights = Lights::build(objects, others, sky, targets);
+            return lights.with_groups(self.groups.clone()).with_links(self.links.clone());
         }
         Lights {
             emitters: Arc::clone(&self.emitters),
@@ -65,6 +68,7 @@ impl Lights {
             sky,
             targets,
             groups: self.groups.clone(),
+            links: self.links.clone(),
         }
     }
 
@@ -106,15 +110,52 @@ impl Lights {
         let floor = EQUAL_SHARE * powers.iter().sum::<f64>() / powers.len().max(1) as f64;
         let floored = powers.iter().map(|&power| if power > 0.0 { power + floor } else { 0.0 });
         let choice = LightSampler::new(&emitters, &sky, floored).map(Arc::new);
-        let groups = Groups::default();
+        let (groups, links) = (Groups::default(), LightLinks::default());
         let (emitters, first, relative, infinite) = (emitters.into(), first.into(), relative.into(), infinite.into());
-        Lights { emitters, choice, first, relative, infinite, bulbs, sky, targets, groups }
+        Lights { emitters, choice, first, relative, infinite, bulbs, sky, targets, groups, links }
     }
 
     /// Assigns the lights to light groups, whose light gets layers of its own.
     #[must_use]
     pub fn with_groups(self, groups: Groups) -> Lights {
         Lights { groups, ..self }
+    }
+
+    /// Limits the light of lights to some objects.
+    #[must_use]
+    pub fn with_links(self, links: LightLinks) -> Lights {
+        Lights { links, ..self }
+    }
+
+    /// The linking of each light.
+    pub fn links(&self) -> &LightLinks {
+        &self.links
+    }
+
+    /// Whether a receiver receives the light of the light with index `light`, as far as light linking decides.
+    #[inline]
+    pub fn shines_on(&self, light: u32, receiver: &Receiver) -> bool {
+        self.links.is_empty() || self.linking(light).lights(receiver)
+    }
+
+    /// The linking of the light with index `light`. Media that emit light have none, as in Cycles.
+    #[inline]
+    pub fn linking(&self, light: u32) -> Linking {
+        let LightLinks { instances, others, .. } = &self.links;
+        let linking = match self.emitters[light as usize].owner() {
+            Owner::Surface(instance) => instances.get(instance as usize),
+            Owner::Light => self.other_index(light, others.len()).and_then(|at| others.get(at)),
+            Owner::Medium(_) | Owner::Environment => None,
+        };
+        linking.copied().unwrap_or_default()
+    }
+
+    /// Index of a light among the `count` points, spots and suns.
+    #[inline]
+    fn other_index(&self, light: u32, count: usize) -> Option<usize> {
+        // They are the emitters between the triangles and the environment.
+        let last = self.emitters.len() - usize::from(self.sky.environment.is_some());
+        (light as usize + count).checked_sub(last)
     }
 
     /// The light groups of the scene: named sets of lights, each with layers of its own.
@@ -135,13 +176,8 @@ impl Lights {
             }
             Owner::Environment => *environment,
             Owner::Light => {
-                // `others` are the emitters between the triangles and the environment.
-                let last = self.emitters.len() - usize::from(self.sky.environment.is_some());
-                (light as usize + others.len())
-                    .checked_sub(last)
-                    .and_then(|at| others.get(at))
-                    .copied()
-                    .unwrap_or_default()
+                let index = self.other_index(light, others.len());
+                index.and_then(|at| others.get(at)).copied().unwrap_or_default()
             }
         }
     }
@@ -229,7 +265,7 @@ impl Lights {
         !self.bulbs.is_empty()
     }
 
-    /// Calls `each(radiance, distance, group)` for every bulb on the ray from `origin` along the unit `d`, up to the
+    /// Calls `each(radiance, distance, light)` for every bulb on the ray from `origin` along the unit `d`, up to the
     /// distance `reach`. The light comes from all points of the bulb along the ray; `distance` is that of one of them,
     /// which the uniform number `u` selects. `camera`: the ray starts at the camera.
     pub fn for_each_bulb(
@@ -239,7 +275,7 @@ impl Lights {
         reach: f32,
         camera: bool,
         u: f32,
-        mut each: impl FnMut(Rgb, f32, Group),
+        mut each: impl FnMut(Rgb, f32, u32),
     ) {
         for &index in self.bulbs.iter() {
             let emitter = &self.emitters[index as usize];
@@ -250,7 +286,7 @@ impl Lights {
             if intensity != Rgb::ZERO
                 && let Some((share, distance)) = crossed_share(p, radius, origin, d, reach, u)
             {
-                each(intensity * (share / (PI * radius * radius)), distance, self.group(index));
+                each(intensity * (share / (PI * radius * radius)), distance, index);
             }
         }
     }
@@ -267,6 +303,9 @@ impl Lights {
         u: Vec2,
     ) -> Option<DirectSample> {
         let (index, probability) = self.choice.as_ref()?.sample(receiver, choice)?;
+        if !self.shines_on(index as u32, receiver) {
+            return None;
+        }
         let (scene, selected) = (self.scene(shapes, materials), Selected { light: index as u32, probability });
         let mut sample = self.emitters[index].sample(&scene, receiver, selected, u)?;
         sample.arrival_factor *= self.choice()?.pdf(index) / probability;
@@ -337,6 +376,9 @@ impl Lights {
         }
         let index = (first + relative) as usize;
         let Emitter::Triangle(triangle) = &self.emitters[index] else { return None };
+        if !self.shines_on(index as u32, from) {
+            return None;
+        }
         let (relative, onward, cos) = triangle.along(surface, wo)?;
         let radiance = materials.list[surface.material as usize].emitted(surface, &materials.textures) * relative;
         let choice = self.choice.as_ref()?;
@@ -357,7 +399,9 @@ impl Lights {
     ) {
         let Some(choice) = &self.choice else { return };
         for &index in self.infinite.iter() {
-            if let Some(light) = self.emitters[index as usize].arriving(&self.sky, from, d, camera) {
+            if self.shines_on(index, from)
+                && let Some(light) = self.emitters[index as usize].arriving(&self.sky, from, d, camera)
+            {
                 let [direct, start] = [choice.pdf(from, index as usize), choice.power().pdf(index as usize)];
                 each(light.radiance, direct * light.direct, start * light.start, self.group(index));
             }

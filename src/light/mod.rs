@@ -12,6 +12,7 @@ mod group;
 pub mod guide;
 mod kind;
 mod lights;
+mod links;
 mod picture;
 mod profile;
 mod receiver;
@@ -36,6 +37,7 @@ pub use kind::{
     SunLight, TriangleLight, VolumeLight,
 };
 pub use lights::Lights;
+pub use links::{LightLinks, Linking, MAX_LINKINGS};
 pub use picture::Picture;
 pub use profile::Profile;
 pub use receiver::Receiver;

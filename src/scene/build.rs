@@ -2,9 +2,9 @@
 
 use super::description::{self, Description, EnvironmentSource, PunctualLight};
 use super::nesting::{Volumes, alpha_solids};
-use super::{Contacts, Scene, SolidStacks, Survey, dense};
+use super::{Contacts, Scene, SolidStacks, Survey, dense, links};
 use crate::error::Result;
-use crate::geometry::{Instance, Mesh, Placement, Shapes};
+use crate::geometry::{Instance, Mesh, ObjectLinks, Placement, Shapes};
 use crate::light::{
     Bulb, Distribution, Emitter, Environment, Group, Groups, ImageEnvironment, Light, LightPlacement, Lights,
     MAX_GROUP_NAME, MAX_GROUPS, Pattern, PointLight, ShapedLight, Sky, SpotCone,
@@ -42,7 +42,12 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     let (center, radius) = bounding_sphere(&description);
     let origin = if center.length() > FAR_FROM_ORIGIN * radius { center } else { DVec3::ZERO };
 
-    let shapes = Arc::new(place_instances(&mut description, origin));
+    let linked = links::resolve(&description, first_light_sphere, &mut warnings);
+    let mut shapes = place_instances(&mut description, origin);
+    for (instance, &links) in shapes.instances.iter_mut().zip(&linked.objects) {
+        instance.links = links;
+    }
+    let shapes = Arc::new(shapes);
     let mut materials = Materials { list: description.materials, textures: description.textures.into() };
     dense::limit_densities(&shapes, &mut materials, &mut description.medium, &mut warnings);
     let materials = Arc::new(materials);
@@ -63,7 +68,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     let mut distributions = Distributions::default();
     let (light_names, others) =
         others.map(|light| (light.name.clone(), punctual(light, origin, &mut distributions))).unzip();
-    let lights = Lights::new(objects, others, sky).with_groups(groups);
+    let lights = Lights::new(objects, others, sky).with_groups(groups).with_links(linked.lights);
     warn_of_cut_solids(objects, &mut warnings);
     warn_of_fires(objects, &mut warnings);
     warn_of_lights(objects, &lights, description.medium, &mut warnings);
@@ -269,6 +274,7 @@ pub(super) fn rebuild_with_materials(
     let others = scene.lights.others().cloned();
     let sky = Sky { environment, ..scene.lights.sky().clone() };
     let lights = Lights::new(objects, others.collect(), sky).with_groups(scene.lights.groups().clone());
+    let lights = lights.with_links(scene.lights.links().clone());
     Ok(Scene {
         source: scene.source.clone(),
         files: scene.files.clone(),
@@ -336,6 +342,7 @@ fn place_instances(description: &mut Description, origin: DVec3) -> Shapes {
             object: placed.object,
             hidden_from_camera: placed.hidden_from_camera,
             shadow_catcher: placed.shadow_catcher,
+            links: ObjectLinks::ALL,
             moves: placed.moves,
             to_world: shared.then(|| placement(&to_world)),
         });
@@ -541,6 +548,7 @@ pub(super) fn add_light_spheres(description: &mut Description) {
             hidden_from_camera: light.hidden_from_camera,
             shadow_catcher: false,
             light_group: light.light_group.clone(),
+            links: light.links.clone(),
             moves: blurred,
             to_world: DAffine3::from_translation(light.to_world.translation),
         });

@@ -139,10 +139,46 @@ pub struct PlacedMesh {
     pub shadow_catcher: bool,
     /// Name of the light group (a named set of lights with a layer of its own) of the instance, if it is emissive.
     pub light_group: Option<String>,
+    /// Collections of the instance, and those that receive and block its light; `None` if there are none.
+    pub links: Option<Arc<Links>>,
     /// Whether the place or the shape of the instance depends on the time while the shutter is open.
     pub moves: bool,
     /// Transform from local to world space.
     pub to_world: DAffine3,
+}
+
+/// Light linking and shadow linking of a node.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Links {
+    /// Names of the collections that the node is in.
+    pub collections: Vec<String>,
+    /// Collections that receive the light of the node.
+    pub receivers: Linked,
+    /// Collections that block the light of the node.
+    pub blockers: Linked,
+}
+
+/// Objects that a light is linked to, by the names of their collections.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(default)]
+pub struct Linked {
+    /// Collections to which the light is limited; all objects if it is empty.
+    pub include: Vec<String>,
+    /// Collections that are left out, also of `include`.
+    pub exclude: Vec<String>,
+}
+
+impl Linked {
+    /// Whether the light is linked to all objects.
+    pub fn is_all(&self) -> bool {
+        self.include.is_empty() && self.exclude.is_empty()
+    }
+
+    /// Whether the light is linked to an object that is in these collections.
+    pub fn has(&self, collections: &[String]) -> bool {
+        let any = |names: &[String]| names.iter().any(|name| collections.contains(name));
+        (self.include.is_empty() || any(&self.include)) && !any(&self.exclude)
+    }
 }
 
 /// A camera; it looks along -Z of its node, +Y up.
@@ -270,6 +306,8 @@ pub struct PunctualLight {
     pub hidden_from_camera: bool,
     /// Name of the light's group (a named set of lights with a layer of its own), if it has one.
     pub light_group: Option<String>,
+    /// Collections that receive and block its light; `None` if all objects do.
+    pub links: Option<Arc<Links>>,
 }
 
 impl PunctualLight {

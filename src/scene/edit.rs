@@ -192,6 +192,7 @@ mod tests {
                 hidden_from_camera: false,
                 shadow_catcher: false,
                 light_group: None,
+                links: None,
                 moves: false,
                 to_world: DAffine3::IDENTITY,
             });

@@ -115,6 +115,7 @@ fn add_floor(description: &mut Description) {
             hidden_from_camera: false,
             shadow_catcher: false,
             light_group: None,
+            links: None,
             moves: false,
             to_world: DAffine3::from_translation(middle),
         });

@@ -15,6 +15,7 @@ pub mod gltf;
 pub mod grid_file;
 pub mod ies;
 pub mod light_preset;
+mod links;
 mod moment;
 mod nesting;
 mod pose;
@@ -33,7 +34,7 @@ pub use survey::Survey;
 pub use view::View;
 
 use crate::error::Result;
-use crate::geometry::{Shapes, Surface};
+use crate::geometry::{ObjectLinks, Shapes, Surface};
 use crate::light::{Environment, Light, Lights, Owner};
 use crate::material::{Materials, MediumParameters, Scattering};
 use crate::math::{DVec3, Vec3};
@@ -156,6 +157,15 @@ impl Scene {
     #[inline(always)]
     pub fn culls(&self, surface: &Surface, direction: Vec3) -> bool {
         self.survey.culled && self.materials.list[surface.material as usize].culled && direction.dot(surface.ng) > 0.0
+    }
+
+    /// Linkings whose light the instance (object) receives ([`ObjectLinks::receives`]).
+    #[inline]
+    pub fn receives(&self, instance: u32) -> u64 {
+        if self.lights.links().is_empty() {
+            return ObjectLinks::ALL.receives;
+        }
+        self.shapes.instances[instance as usize].links.receives
     }
 
     /// The name of a light in messages: `light "Sun"`, or `object "Panel"` for an emissive triangle or

@@ -81,6 +81,7 @@ fn sun(intensity: f32) -> PunctualLight {
         radius: 0.0,
         hidden_from_camera: false,
         light_group: None,
+        links: None,
     }
 }
 

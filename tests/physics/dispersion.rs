@@ -271,6 +271,7 @@ fn deviated(scene: &Scene, wavelength: WavelengthSample, arriving: f64) -> f64 {
         far: false,
         channel: None,
         wavelength_sample: wavelength,
+        linked: None,
     };
     for path in 0..100 {
         let mut straight = Straight::default();
@@ -334,6 +335,7 @@ fn photons_behind_a_prism_land_where_their_colour_belongs() {
             radius: 0.0,
             hidden_from_camera: false,
             light_group: None,
+            links: None,
         });
         let scene = build(description);
         assert_eq!(scene.survey.dispersion, abbe < 1e6);
@@ -446,6 +448,7 @@ fn sun(direction: DVec3, angle_deg: f32, irradiance: f32) -> PunctualLight {
         radius: 0.0,
         hidden_from_camera: false,
         light_group: None,
+        links: None,
     }
 }
 

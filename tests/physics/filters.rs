@@ -41,6 +41,7 @@ fn strip() -> Scene {
         radius: 0.0,
         hidden_from_camera: false,
         light_group: None,
+        links: None,
     });
     let fov = 2.0 * (f64::from(WIDTH) / 2.0 / 10.0).atan().to_degrees();
     description.cameras.push(look_at(DVec3::new(0.0, 10.0, 0.0), DVec3::ZERO, fov as f32));

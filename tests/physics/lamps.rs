@@ -219,6 +219,7 @@ fn cameras_see_no_hidden_light_from_infinity() {
         radius: 0.0,
         hidden_from_camera: true,
         light_group: None,
+        links: None,
     });
     description.environment_hidden_from_camera = true;
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 0.0), DVec3::ZERO, 10.0));

@@ -34,6 +34,7 @@ fn extremes(half: f32, method: Method, turn: DQuat) -> (f64, f64) {
         radius: 0.0,
         hidden_from_camera: false,
         light_group: None,
+        links: None,
     });
     let at = turn * DVec3::new(0.013, 0.0, -0.007);
     description.cameras.push(look_at(at + normal * 0.4 + turn * DVec3::new(0.1, 0.0, 0.05), at, 50.0));
@@ -85,6 +86,7 @@ fn a_small_shadow_on_a_wide_floor_is_whole() {
             radius: 0.0,
             hidden_from_camera: false,
             light_group: None,
+            links: None,
         });
         // From below the square, where all of the visible floor is in its shadow.
         description.cameras.push(look_at(DVec3::new(0.0, 5e-4, 0.03), DVec3::new(0.0, 0.0, 0.005), 0.5));

@@ -21,6 +21,7 @@ mod hidden;
 mod lamps;
 mod large_triangles;
 mod light_groups;
+mod links;
 mod lobe_layers;
 mod long_paths;
 mod many_lights;

@@ -72,7 +72,7 @@ impl Met<'_> {
             Scatters::Surface(shading) => lit_side(shading, self.ng, self.wo),
             Scatters::Medium(_) => Vec3::ZERO,
         };
-        Receiver { p: self.p, n, in_medium: self.scatters.in_medium() }
+        Receiver { n, in_medium: self.scatters.in_medium(), ..Receiver::anywhere(self.p) }
     }
 }
 

@@ -28,6 +28,7 @@ fn scene(inner: f32, outer: f32, edge: SpotEdge, radius: f32) -> Scene {
         radius,
         hidden_from_camera: false,
         light_group: None,
+        links: None,
     });
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 4.0), DVec3::ZERO, 40.0));
     build(description)

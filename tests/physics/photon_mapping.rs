@@ -150,6 +150,7 @@ fn sun_through_a_slab() {
         radius: 0.0,
         hidden_from_camera: false,
         light_group: None,
+        links: None,
     });
     description.cameras.push(look_at(DVec3::new(0.0, 2.0, 0.0), DVec3::ZERO, 14.0));
     let scene = build(description);

@@ -55,7 +55,7 @@ fn blocked(scenes: u64, receivers: u64) -> ([u64; 3], u64) {
         let Some(middle) = scene.shapes.surface(0, 0, [0.3, 0.3]) else { continue };
         for _ in 0..receivers {
             let from = middle.p + (uniform.direction() * size * uniform.power(-2.0, 4.0)).as_vec3();
-            let receiver = Receiver { p: from, n: Vec3::ZERO, in_medium: false };
+            let receiver = Receiver::anywhere(from);
             let u = Vec2::new(uniform.next() as f32, uniform.next() as f32);
             let Some(sample) = scene.lights.sample_direct(&scene.shapes, &scene.materials, &receiver, 0.5, u) else {
                 continue;

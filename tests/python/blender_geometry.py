@@ -171,12 +171,12 @@ class Geometry(cycles_comparison.CyclesComparison):
         self.silhouettes_agree(self.caustique(16), self.cycles(16))
 
     def test_losses_are_named(self):
-        """Hair, holdouts, light linking, and nodes that act only in the viewport."""
+        """Hair, holdouts, shadow linking, and nodes that act only in the viewport."""
         hair = bpy.data.hair_curves.new("hair")
         hair.add_curves([4])
         self.put("hair", 0, 0, None, hair)
         linked = self.put("linked", 1, 0, (1, 0, 0))
-        linked.light_linking.receiver_collection = self.collection("receivers")
+        linked.light_linking.blocker_collection = self.collection("receivers")
         self.put("out", 2, 0, (1, 0, 0)).is_holdout = True
         nodes = self.put("nodes", 3, 0, (0, 0, 0))
         self.instance_on_points(nodes, None, glow("made by nodes", (1, 1, 0)))
@@ -186,7 +186,7 @@ class Geometry(cycles_comparison.CyclesComparison):
         self.look(6)
         warnings = export.write(self.path)
         self.assertEqual(len(warnings), 4, warnings)
-        for what, said in zip(('"hair": hair curves are', '"linked": its light linking', '"nodes": its modifier "nodes" has an '
+        for what, said in zip(('"hair": hair curves are', '"linked": its shadow linking', '"nodes": its modifier "nodes" has an '
                                'Is Viewport node', '"out": it is a holdout'), sorted(warnings)):
             self.assertIn("object " + what, said)
 

@@ -42,6 +42,36 @@ class Lamps(cycles_comparison.CyclesComparison):
             self.alike(self.caustique(), theirs)
             self.assertEqual(self.warnings, [])
 
+    def test_light_linking(self):
+        """Lamps of all kinds and emissive meshes name the collections that receive their light; children of a linking
+        collection have a state each, and copies of a collection are in those of their instancer."""
+        self.floor()
+        bodies = {name: shared.place(name, square(glow(name, (0, 0, 0)), 0.2), (0, 0, 0.5)) for name in "abcd"}
+        linked, child, pair = (bpy.data.collections.new(name) for name in ("linked", "child", "pair"))
+        linked.objects.link(bodies["a"])
+        linked.children.link(child)
+        for name in "bc":
+            child.objects.link(bodies[name])
+        linked.collection_children[0].light_linking.link_state = "EXCLUDE"
+        pair.objects.link(bodies["d"])
+        copies = bpy.data.objects.new("copies", None)
+        copies.instance_type, copies.instance_collection = "COLLECTION", pair
+        self.scene.collection.objects.link(copies)
+        child.objects.link(copies)
+        glowing = shared.place("glowing", square(glow("bright", (1, 1, 1)), 0.2), (0, 1, 0.5))
+        for thing in (lamp("AREA", (0, 0, 1), 20), lamp("POINT", (1, 0, 1), 20), lamp("SUN", (1, 0, 1), 20), glowing):
+            thing.light_linking.receiver_collection = linked
+        warnings = export.write(self.path)
+        self.assertFalse([line for line in warnings if "link" in line], warnings)
+        nodes = glb.read(self.path)[0]["nodes"]
+        said = [(node["name"], node.get("extras", {}).get("caustique", {})) for node in nodes]
+        lights = {name for name, keys in said
+                  if keys.get("receivers") == {"include": ["linked"], "exclude": ["linked (excluded)"]}}
+        self.assertEqual({name.replace(".", " ").split()[0].lower() for name in lights}, {"area", "point", "sun", "glowing"})
+        sets = sorted((name, *keys["collections"]) for name, keys in said if "collections" in keys)
+        self.assertEqual(sets, [("a", "linked"), ("b", "linked (excluded)"), ("c", "linked (excluded)"),
+                                ("d", "linked (excluded)")])
+
     def test_light_groups(self):
         """Lamps, emissive meshes, their instances and the world have their light group, if the view layer has it."""
         self.floor()
@@ -388,11 +418,9 @@ class Lamps(cycles_comparison.CyclesComparison):
             self.assertIn(what, warnings)
         lamp("AREA", (0, 0, 2), 1000).data.cycles.is_portal = True
         linked = lamp("POINT", (0, 3, 3), 10, shadow_soft_size=0.0)
-        for kind in ("receiver", "blocker"):
-            setattr(linked.light_linking, kind + "_collection", bpy.data.collections.new(kind))
+        linked.light_linking.blocker_collection = bpy.data.collections.new("blocker")
         warnings = "\n".join(export.write(self.path))
-        for what in ('light "area.001": it is a portal', '": its light linking (collection "receiver") is not carried',
-                     '": its shadow linking (collection "blocker") is not carried'):
+        for what in ('light "area.001": it is a portal', '": its shadow linking (collection "blocker") is not carried'):
             self.assertIn(what, warnings)
         made = [material["name"] for material in glb.read(self.path)[0]["materials"]]
         self.assertEqual(sum("area light" in name for name in made), 1, "portals are dark")

@@ -14,6 +14,8 @@ use std::f64::consts::{PI, TAU};
 const CAMERA_SPACE: f64 = 0.08;
 /// First seed of scenes with fires, alpha of solids and dark lights. Tests name scenes of earlier seeds for what they show.
 const FIRST_WITH_ADDITIONS: u64 = 2000;
+/// First seed of scenes with light linking.
+const FIRST_WITH_LINKS: u64 = 3000;
 /// Number of attempts to find a place for a thing.
 const ATTEMPTS: usize = 40;
 
@@ -45,6 +47,9 @@ pub fn generate(seed: u64) -> World {
         // Drawn by numbers of their own, so that the rest of a seed's scene stays.
         let own = std::mem::replace(&mut generator.random, Random::new(seed ^ 0x5ca1e));
         generator.rare();
+        if seed >= FIRST_WITH_LINKS && generator.random.chance(0.3) {
+            generator.link();
+        }
         generator.random = own;
     }
     generator.placed()
@@ -470,6 +475,21 @@ impl Generator {
             let matter = Matter { priority: -2, ..self.transparent() };
             let mesh = sphere(16, false);
             self.world.add("around", mesh, matter, vec![place]).hidden = true;
+        }
+    }
+
+    /// Lets some lights shine on some bodies only.
+    fn link(&mut self) {
+        let mut bodies: Vec<u32> = self.world.things.iter().filter(|t| t.mesh().is_some()).map(|t| t.body).collect();
+        bodies.sort_unstable();
+        bodies.dedup();
+        for index in 0..self.world.things.len() {
+            let thing = &self.world.things[index];
+            let shines = matches!(thing.kind, ThingKind::Light(_));
+            if shines || self.world.matter(thing).is_some_and(|matter| matter.glows()) {
+                let unlit = bodies.iter().copied().filter(|_| self.random.chance(0.4)).collect();
+                self.world.things[index].unlit = unlit;
+            }
         }
     }
 

@@ -58,6 +58,9 @@ pub struct Thing {
     /// Whether cameras do not see the thing.
     #[serde(default)]
     pub hidden: bool,
+    /// Bodies that do not receive the light of the thing, if it is a light.
+    #[serde(default)]
+    pub unlit: Vec<u32>,
 }
 
 /// Kind of a thing.
@@ -295,7 +298,15 @@ impl World {
     pub fn add_kind(&mut self, name: &str, kind: ThingKind, chain: Vec<Placement>) -> &mut Thing {
         let index = self.things.len();
         let body = self.things.iter().map(|thing| thing.body + 1).max().unwrap_or(0);
-        self.things.push(Thing { name: format!("{name} {index}"), chain, kind, body, rests: false, hidden: false });
+        self.things.push(Thing {
+            name: format!("{name} {index}"),
+            chain,
+            kind,
+            body,
+            rests: false,
+            hidden: false,
+            unlit: vec![],
+        });
         &mut self.things[index]
     }
 

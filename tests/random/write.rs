@@ -103,6 +103,13 @@ impl Writer {
             }
             ThingKind::Camera(lens) => self.camera(lens, &mut node),
         }
+        if world.things.iter().any(|thing| !thing.unlit.is_empty()) {
+            node["extras"]["caustique"]["collections"] = json!([format!("body {}", thing.body)]);
+        }
+        if !thing.unlit.is_empty() {
+            let exclude: Vec<String> = thing.unlit.iter().map(|body| format!("body {body}")).collect();
+            node["extras"]["caustique"]["receivers"] = json!({"exclude": exclude});
+        }
         let mut above: Option<usize> = None;
         let last = thing.chain.len().saturating_sub(1);
         for (depth, placement) in thing.chain.iter().enumerate().rev() {

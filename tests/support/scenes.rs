@@ -54,6 +54,7 @@ pub fn add_at(description: &mut Description, name: &str, mesh: Mesh, material: M
         hidden_from_camera: false,
         shadow_catcher: false,
         light_group: None,
+        links: None,
         moves: false,
         to_world,
     });
@@ -144,6 +145,7 @@ pub fn point_light(p: DVec3, intensity: f32) -> PunctualLight {
         radius: 0.0,
         hidden_from_camera: false,
         light_group: None,
+        links: None,
     }
 }
 

@@ -13,7 +13,7 @@ use crate::stop::Stop;
 use std::path::Path;
 
 /// Names and contents of the exporter's files (in Python), embedded in the program.
-const SOURCES: [(&str, &str); 31] = [
+const SOURCES: [(&str, &str); 32] = [
     ("attributes.py", include_str!("../../../scripts/blender/attributes.py")),
     ("bake.py", include_str!("../../../scripts/blender/bake.py")),
     ("bake_cache.py", include_str!("../../../scripts/blender/bake_cache.py")),
@@ -30,6 +30,7 @@ const SOURCES: [(&str, &str); 31] = [
     ("lamp_pictures.py", include_str!("../../../scripts/blender/lamp_pictures.py")),
     ("lamp_profiles.py", include_str!("../../../scripts/blender/lamp_profiles.py")),
     ("lighting.py", include_str!("../../../scripts/blender/lighting.py")),
+    ("linking.py", include_str!("../../../scripts/blender/linking.py")),
     ("lobes.py", include_str!("../../../scripts/blender/lobes.py")),
     ("matching.py", include_str!("../../../scripts/blender/matching.py")),
     ("material_plan.py", include_str!("../../../scripts/blender/material_plan.py")),

@@ -7,7 +7,7 @@ use super::texture::Info;
 use crate::error::Result;
 use crate::material::MediumParameters;
 use crate::math::Rgb;
-use crate::scene::description::{Contrast, ToneMap};
+use crate::scene::description::{Contrast, Linked, ToneMap};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -175,6 +175,15 @@ pub(super) struct ObjectExtras {
     pub(super) shadow_catcher: bool,
 }
 
+/// Light linking and shadow linking in `extras.caustique` of a node with a mesh or a light.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+pub(super) struct LinkExtras {
+    pub(super) collections: Vec<String>,
+    pub(super) receivers: Linked,
+    pub(super) blockers: Linked,
+}
+
 /// Content of `extras.caustique` of a camera, or of its node.
 #[derive(Default, Deserialize)]
 #[serde(default)]
@@ -324,6 +333,13 @@ pub(super) const NODE: &[&str] = &[
     "visible.camera",
     "light_group",
     "shadow_catcher",
+    "collections",
+    "receivers",
+    "receivers.include",
+    "receivers.exclude",
+    "blockers",
+    "blockers.include",
+    "blockers.exclude",
     "ies",
     "ies.file",
     "ies.bufferView",

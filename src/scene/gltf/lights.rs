@@ -247,6 +247,7 @@ pub(super) fn light(
         bulb,
         hidden_from_camera,
         light_group,
+        links: None,
     };
     if let Some(ies) = on_node.ies.or(on_light.ies) {
         profiles.apply(document, &ies, &mut light, &place, warnings)?;

@@ -4,7 +4,7 @@ use super::animation::{MovingParts, Tracks};
 use super::clipping::{self, Clip};
 use super::deform::Deformation;
 use super::document::{Document, extension, get, named};
-use super::extras::{self, ObjectExtras, Rate, SceneExtras};
+use super::extras::{self, LinkExtras, ObjectExtras, Rate, SceneExtras};
 use super::files;
 use super::flat::flatten;
 use super::materials::{Library, tangent_coordinates};
@@ -21,7 +21,7 @@ use crate::material::Material;
 use crate::math::{DAffine3, DMat3, Rgb, Vec3, bounding_box};
 use crate::memory;
 use crate::scene::Description;
-use crate::scene::description::{self, EnvironmentDescription, EnvironmentSource, PictureDefaults, PlacedMesh};
+use crate::scene::description::{self, EnvironmentDescription, EnvironmentSource, Links, PictureDefaults, PlacedMesh};
 use crate::scene::environment_file;
 use crate::scene::folder::Folder;
 use serde::Deserialize;
@@ -184,10 +184,32 @@ struct Part {
     material: u32,
 }
 
+/// What a node passes on to its children.
+#[derive(Clone)]
+struct Inherited {
+    to_world: DAffine3,
+    shown: bool,
+    moves: bool,
+    /// Names of the collections that the node is in, by itself or by its parents.
+    collections: Arc<Vec<String>>,
+}
+
+impl Inherited {
+    /// Adds the collections of a node, and returns its light linking and shadow linking; `None` if it has none.
+    fn link(&mut self, LinkExtras { collections, receivers, blockers }: LinkExtras) -> Option<Arc<Links>> {
+        if !collections.is_empty() {
+            Arc::make_mut(&mut self.collections).extend(collections);
+        }
+        let links = Links { collections: self.collections.to_vec(), receivers, blockers };
+        (links != Links::default()).then(|| Arc::new(links))
+    }
+}
+
 /// An object of the scene that is placed once or several times.
 struct Object<'o> {
     name: String,
     extras: &'o ObjectExtras,
+    links: Option<Arc<Links>>,
     /// Whether its place or shape depends on the time while the shutter is open.
     moves: bool,
 }
@@ -388,9 +410,9 @@ impl<'r> Reader<'r> {
         let document = self.document;
         let mut seen = vec![false; document.nodes.len()];
         let moving = self.moving_parts();
-        let mut stack: Vec<(usize, DAffine3, bool, bool)> =
-            roots.into_iter().rev().map(|n| (n, DAffine3::IDENTITY, true, false)).collect();
-        while let Some((index, parent, shown, moves)) = stack.pop() {
+        let root = Inherited { to_world: DAffine3::IDENTITY, shown: true, moves: false, collections: Arc::default() };
+        let mut stack: Vec<(usize, Inherited)> = roots.into_iter().rev().map(|n| (n, root.clone())).collect();
+        while let Some((index, parent)) = stack.pop() {
             let node = get(&document.nodes, index, "node")?;
             let place = named("node", node.name.as_deref(), index);
             if std::mem::replace(&mut seen[index], true) {
@@ -398,18 +420,20 @@ impl<'r> Reader<'r> {
                     .hint("the file is damaged: export it again"));
             }
             let raw = document.part("nodes", index);
-            let to_world = parent * local(raw, &place)?;
+            let to_world = parent.to_world * local(raw, &place)?;
             if !is_finite(&to_world) {
                 return Err(fault(place, "its transform is not finite").hint("look at its scale and position"));
             }
-            let shown = shown
+            let shown = parent.shown
                 && extension::<Visibility>(raw, "KHR_node_visibility", &place)?
                     .is_none_or(|visibility| visibility.visible);
-            let moves = moves || moving.is_some_and(|moving| moving.moves(index));
-            self.node(index, raw, &place, to_world, shown, moves)?;
+            let moves = parent.moves || moving.is_some_and(|moving| moving.moves(index));
+            let mut inherited = Inherited { to_world, shown, moves, ..parent };
+            let links = inherited.link(extras::read(raw, &place)?);
+            self.node(index, raw, &place, &inherited, links)?;
             for child in node.children.iter().flatten().rev() {
                 get(&document.nodes, child.value(), "node").map_err(|e| e.within(&place))?;
-                stack.push((child.value(), to_world, shown, moves));
+                stack.push((child.value(), inherited.clone()));
             }
         }
         // A file without a camera is a model more than a scene, and its surfaces that glow are no lights.
@@ -423,9 +447,8 @@ impl<'r> Reader<'r> {
         index: usize,
         raw: &Value,
         place: &str,
-        to_world: DAffine3,
-        shown: bool,
-        moves: bool,
+        &Inherited { to_world, shown, moves, .. }: &Inherited,
+        links: Option<Arc<Links>>,
     ) -> Result<()> {
         let document = self.document;
         let node = &document.nodes[index];
@@ -443,7 +466,9 @@ impl<'r> Reader<'r> {
         }
         let reference = extension::<LightReference>(raw, "KHR_lights_punctual", place)?;
         if reference.is_some() || profiles::has_light(raw) {
+            let before = self.out.lights.len();
             self.lights(reference, (&name, raw), place, to_world).map_err(|e| e.within(place))?;
+            self.out.lights[before..].iter_mut().for_each(|light| light.links.clone_from(&links));
         }
         if let Some(mesh) = node.mesh {
             let mesh = mesh.value();
@@ -460,7 +485,7 @@ impl<'r> Reader<'r> {
                 Some(moment) => self.parts_at_moment(moment, mesh, owner, &shape, deforms, &name)?,
                 None => self.parts(mesh, owner, &shape)?,
             };
-            let object = Object { name, extras: &extras, moves: moves || deforms };
+            let object = Object { name, extras: &extras, links, moves: moves || deforms };
             self.place(&parts, object, self.copies(raw, place)?, to_world, place)?;
         }
         Ok(())
@@ -495,7 +520,7 @@ impl<'r> Reader<'r> {
     fn place(
         &mut self,
         parts: &[Part],
-        Object { name, extras, moves }: Object<'_>,
+        Object { name, extras, links, moves }: Object<'_>,
         copies: Vec<DAffine3>,
         to_world: DAffine3,
         place: &str,
@@ -531,6 +556,7 @@ impl<'r> Reader<'r> {
                     hidden_from_camera,
                     shadow_catcher,
                     light_group,
+                    links: links.clone(),
                     moves,
                     to_world,
                 });

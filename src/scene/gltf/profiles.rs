@@ -302,5 +302,6 @@ pub(super) fn light(
         bulb: extras.bulb.unwrap_or(false),
         hidden_from_camera: extras.visible.is_some_and(|visible| !visible.camera),
         light_group: extras.light_group,
+        links: None,
     }))
 }

@@ -399,7 +399,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
         if !self.history.leads(camera_paths.classes) || self.shared.ends_camera_path(vertex.depth) {
             return Next::Stop;
         }
-        self.last = vertex.receiver();
+        self.last = vertex.receiver(camera_paths.scene);
         // Without connections and merging, only light through mirrors and clear glass is left to find.
         Next::Continue(if techniques.connect || techniques.merge { LobeSet::ALL } else { LobeSet::DELTA })
     }
@@ -442,11 +442,12 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
             self.history.scattered(scattered.lobe);
         }
         self.depth = hit.depth;
-        if self.history.delta {
+        let lights = &self.shared.camera_paths.scene.lights;
+        if self.history.delta && lights.shines_on(hit.emitter, &self.last) {
             // Its density does not count, because no other technique finds the path.
             let density =
                 EmissionDensity { direct: 0.0, start: 0.0, onward: 0.0, cos: 1.0, infinite: false, delta: true };
-            self.hit_light(hit.light, hit.group, LightHit { depth: hit.depth, at: hit.at }, &density);
+            self.hit_light(hit.light, lights.group(hit.emitter), LightHit { depth: hit.depth, at: hit.at }, &density);
         }
         (self.history, self.depth) = before;
     }
@@ -481,7 +482,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
         if !self.history.leads(camera_paths.classes) || self.shared.ends_camera_path(vertex.depth) {
             return Next::Stop;
         }
-        self.last = vertex.receiver();
+        self.last = vertex.receiver(camera_paths.scene);
         // As on surfaces: only mirrors and clear glass show what light tracing does not find.
         if techniques.connect || techniques.merge { Next::Continue(LobeSet::ALL) } else { Next::Stop }
     }

@@ -216,7 +216,7 @@ impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
     fn surface(&mut self, vertex: &Vertex<'_, 's>, scattered: Option<Scattered>) -> Next {
         let Bidirectional { camera_paths, techniques, merged_paths, .. } = self.shared;
         self.arrive(
-            (&vertex.receiver(), vertex.wo),
+            (&vertex.receiver(camera_paths.scene), vertex.wo),
             vertex.distance,
             vertex.wo.dot(vertex.surface.ng).abs(),
             vertex.flight,
@@ -266,7 +266,13 @@ impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
     #[inline]
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
         let Bidirectional { camera_paths, techniques, .. } = self.shared;
-        self.arrive((&vertex.receiver(), vertex.wo), vertex.arrival.distance, 1.0, vertex.flight, scattered);
+        self.arrive(
+            (&vertex.receiver(camera_paths.scene), vertex.wo),
+            vertex.arrival.distance,
+            1.0,
+            vertex.flight,
+            scattered,
+        );
         self.lobes = None;
         let connected = self.shared.connects_light_vertex(vertex.depth);
         if connected && !self.photons_only && vertex.depth < camera_paths.max_depth {

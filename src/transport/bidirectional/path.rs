@@ -191,7 +191,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
         if let Some(catchers) = &self.scene.catchers
             && self.catches(vertex, scattered, catchers)
         {
-            self.last = vertex.receiver();
+            self.last = vertex.receiver(self.scene);
             self.history.leave(Some(vertex.shading.bsdf.lobes()));
             return if self.on_catcher { self.next() } else { Next::Stop };
         }
@@ -204,7 +204,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
             let weight = Self::weight(scattered, pdf);
             self.add(Technique::Hit { camera: self.depth }, of, vertex.throughput * radiance * weight, weight);
         }
-        self.last = vertex.receiver();
+        self.last = vertex.receiver(self.scene);
         self.lit(vertex);
         self.history.leave(Some(vertex.shading.bsdf.lobes()));
         self.next()
@@ -253,8 +253,9 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
 
     fn bulb(&mut self, hit: &BulbHit, scattered: Option<Scattered>) {
         let history = self.arriving(scattered);
-        if history.delta && !self.on_catcher {
-            self.add_hit(&history, hit.depth, hit.group, hit.light, 1.0);
+        let lights = &self.scene.lights;
+        if history.delta && !self.on_catcher && lights.shines_on(hit.emitter, &self.last) {
+            self.add_hit(&history, hit.depth, lights.group(hit.emitter), hit.light, 1.0);
         }
     }
 
@@ -262,7 +263,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
         record_medium(&mut self.history, vertex, scattered, self.sample);
         self.on_catcher = false;
         self.depth = vertex.depth;
-        self.last = vertex.receiver();
+        self.last = vertex.receiver(self.scene);
         self.lit(vertex);
         self.history.leave(None);
         self.next()

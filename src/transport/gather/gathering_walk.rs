@@ -303,7 +303,7 @@ impl<'a, B: GatherBandwidths> Visitor<'a> for GatheringWalk<'_, B> {
             let density = || Some(lights.emitted(materials, &from, surface, vertex.wo)?.1);
             self.hit_light(vertex.throughput * radiance, pdf, scattered, FirstScatter::Emit, density);
         }
-        self.last = vertex.receiver();
+        self.last = vertex.receiver(self.scene);
         let lobes = shading.bsdf.lobes();
         let smooth = lobes & LobeSet::SMOOTH;
         // Lights and other surfaces that scatter nothing have features, too.
@@ -348,6 +348,9 @@ impl<'a, B: GatherBandwidths> Visitor<'a> for GatheringWalk<'_, B> {
     }
 
     fn bulb(&mut self, hit: &BulbHit, scattered: Option<Scattered>) {
+        if !self.scene.lights.shines_on(hit.emitter, &self.last) {
+            return;
+        }
         let before = self.suffix;
         self.suffix = self.suffix_on_arrival(scattered);
         if matches!(self.suffix.class_at_light(false), PathClass::Emission | PathClass::Coat) {

@@ -223,6 +223,7 @@ impl<'a> LightPaths<'a> {
                 far: emission.infinite,
                 channel: None,
                 wavelength_sample: self.wavelength_sample_of(stream),
+                linked: (!lights.links().is_empty()).then_some(emission.light),
             },
             stream,
             delta: emission.delta,

@@ -116,6 +116,7 @@ impl CameraPaths<'_> {
             far: false,
             channel: None,
             wavelength_sample: WavelengthSample::new(draws.one(Purpose::Wavelength)),
+            linked: None,
         }
     }
 

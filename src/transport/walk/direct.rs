@@ -151,7 +151,7 @@ fn bsdf_sample<S: ScatterPoint>(scene: &Scene, vertex: &S, set: LobeSet, lobes: 
     match next_surface(scene, start) {
         End::Surface(arrival) => {
             reach = arrival.distance;
-            let from = vertex.receiver();
+            let from = vertex.receiver(scene);
             if let Some((radiance, pdf)) =
                 scene.lights.hit_radiance(&scene.materials, &from, &arrival.surface, -sample.wi)
             {
@@ -160,13 +160,13 @@ fn bsdf_sample<S: ScatterPoint>(scene: &Scene, vertex: &S, set: LobeSet, lobes: 
         }
         End::Escaped(left) => {
             let add = |radiance, pdf, _, _| light += radiance * left * weight(pdf);
-            scene.lights.for_each_infinite(&vertex.receiver(), sample.wi, false, add);
+            scene.lights.for_each_infinite(&vertex.receiver(scene), sample.wi, false, add);
         }
         End::Medium(_) | End::Lost => {}
     }
     for_each_pass_through_light(scene, &start, reach, S::IN_MEDIUM, |surface, _, left, _| {
         if let Some((radiance, pdf)) =
-            scene.lights.hit_radiance(&scene.materials, &vertex.receiver(), surface, -sample.wi)
+            scene.lights.hit_radiance(&scene.materials, &vertex.receiver(scene), surface, -sample.wi)
         {
             light += radiance * left * weight(pdf);
         }

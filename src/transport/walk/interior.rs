@@ -11,7 +11,7 @@
 //! probabilities of their common decisions ([`Presence::chance`]), which both have sampled, divides the contribution
 //! and multiplies the density of the technique in MIS weights.
 
-use crate::geometry::Placement;
+use crate::geometry::{ObjectLinks, Placement};
 use crate::material::{Material, MediumParameters};
 use crate::math::Vec3;
 use crate::medium::{GridRay, MediumGrids};
@@ -301,6 +301,15 @@ impl Interior {
         // `max_by_key` returns the last of equal ones, which belong to one object.
         let inner = present.max_by_key(|&instance| strength(scene, instance));
         if self.outer == EMPTY_STACK { inner } else { stronger(scene, self.outer, inner) }
+    }
+
+    /// Linkings whose light the medium around the path receives ([`crate::geometry::ObjectLinks::receives`]).
+    #[inline]
+    pub fn receives(&self, scene: &Scene) -> u64 {
+        if scene.lights.links().is_empty() {
+            return ObjectLinks::ALL.receives;
+        }
+        self.host(scene).map_or(scene.lights.links().medium_receives, |instance| scene.receives(instance))
     }
 
     /// Whether a solid that is hidden from cameras fills the space around the path.

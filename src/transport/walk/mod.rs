@@ -19,6 +19,7 @@ pub(in crate::transport) mod vertex;
 pub(in crate::transport) mod visible;
 
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
+use crate::light::Receiver;
 use crate::math::{Rgb, Vec3, is_lit};
 use crate::medium::FlightDensity;
 use crate::random::{Draws, Purpose, Stream};
@@ -61,6 +62,8 @@ pub struct PathStart {
     pub channel: Option<usize>,
     /// The wavelength that the path takes if it meets dispersive glass.
     pub wavelength_sample: WavelengthSample,
+    /// Index of the light that a light path starts from, if it ends at the first vertex where light linking says so.
+    pub linked: Option<u32>,
 }
 
 /// Traces the path from `start`, with at most `max_depth` segments, and shows its vertices to the visitor. The vertices
@@ -119,8 +122,8 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
     max_depth: u32,
     visitor: &mut V,
 ) {
-    let PathStart { origin, direction, throughput, interior, leaving, ref first, far, channel, wavelength_sample } =
-        *start;
+    let PathStart { origin, direction, throughput, interior, leaving, far, channel, wavelength_sample, .. } = *start;
+    let PathStart { ref first, linked, .. } = *start;
     let survival_scale = 1.0 / (visitor.spared() * throughput.max_element());
     if !(survival_scale.is_finite() && throughput.is_finite()) {
         end(throughput, visitor);
@@ -134,6 +137,7 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
         max_depth,
         channel: channel.map(|channel| (channel, throughput[channel])),
         wavelength_sample,
+        linked,
         far,
         depth: 1,
         origin,
@@ -176,6 +180,8 @@ struct Path<'a> {
     /// Channel index and weight of a path of a single channel; `None` for all channels.
     channel: Option<(usize, f32)>,
     wavelength_sample: WavelengthSample,
+    /// Index of the light that a light path starts from, if light linking limits its light.
+    linked: Option<u32>,
     far: bool,
     /// Number of the current path segment, from 1.
     depth: u32,
@@ -210,6 +216,9 @@ impl<'a> Path<'a> {
             known = &PrecomputedHit::Unknown;
             if self.scene.survey.hidden_solids && self.depth == 1 && self.transport == Transport::Radiance {
                 self.enter_hidden_solids(&end);
+            }
+            if self.depth == 1 && self.linked.is_some_and(|light| !receives(self.scene, &end, light)) {
+                return;
             }
             let goes_on = match end {
                 End::Surface(arrival) => self.surface::<V, BESIDES>(arrival, flight, visitor),
@@ -584,6 +593,19 @@ impl<'a> Path<'a> {
     }
 }
 
+/// Whether the object or the medium at the end of the first segment of a light path receives its light, as far as light
+/// linking decides.
+#[cold]
+#[inline(never)]
+fn receives(scene: &Scene, end: &End, light: u32) -> bool {
+    let (p, links) = match end {
+        End::Surface(arrival) => (arrival.surface.p, scene.receives(arrival.surface.instance)),
+        End::Medium(arrival) => (arrival.p, arrival.interior.receives(scene)),
+        End::Escaped(_) | End::Lost => return true,
+    };
+    scene.lights.shines_on(light, &Receiver { links, ..Receiver::anywhere(p) })
+}
+
 /// A segment of a camera path that has been followed to its end.
 struct Segment<'s> {
     start: &'s Start,
@@ -617,7 +639,7 @@ fn visit_pass_through_lights<'a, V: Visitor<'a>>(scene: &Scene, segment: &Segmen
 fn visit_bulbs<'a, V: Visitor<'a>>(scene: &Scene, segment: &Segment<'_>, draws: Draws, visitor: &mut V) {
     let Segment { start, end, from_medium, throughput, depth, scattered } = *segment;
     let reach = if let End::Surface(arrival) = end { arrival.distance } else { f32::INFINITY };
-    for_each_bulb(scene, start, reach, from_medium, depth == 1, draws, |radiance, at, group| {
-        visitor.bulb(&BulbHit { light: throughput * radiance, group, depth, at }, scattered);
+    for_each_bulb(scene, start, reach, from_medium, depth == 1, draws, |radiance, at, emitter| {
+        visitor.bulb(&BulbHit { light: throughput * radiance, emitter, depth, at }, scattered);
     });
 }

@@ -6,7 +6,6 @@
 
 use super::segment::{Destination, ShadowRay, Start, shadow_ray};
 use crate::geometry::Surface;
-use crate::light::Group;
 use crate::math::{Rgb, Vec3};
 use crate::medium::FlightDensity;
 use crate::random::{Draws, Purpose};
@@ -64,8 +63,8 @@ pub(in crate::transport) fn for_each_pass_through_light(
 pub struct BulbHit {
     /// Light that reaches the camera from the bulb.
     pub light: Rgb,
-    /// Light group of the bulb.
-    pub group: Group,
+    /// Index of the light that the bulb belongs to.
+    pub emitter: u32,
     /// Number of path segments up to the bulb.
     pub depth: u32,
     /// A point in the bulb, on the segment.
@@ -73,7 +72,7 @@ pub struct BulbHit {
 }
 
 /// Calls `each` with every bulb on a ray up to the distance `reach`: the radiance that arrives at the origin, a point in
-/// the bulb, and its light group. The ray starts in a medium, or at the camera.
+/// the bulb, and the index of its light. The ray starts in a medium, or at the camera.
 pub(in crate::transport) fn for_each_bulb(
     scene: &Scene,
     start: &Start,
@@ -81,11 +80,11 @@ pub(in crate::transport) fn for_each_bulb(
     from_medium: bool,
     camera: bool,
     draws: Draws,
-    mut each: impl FnMut(Rgb, Vec3, Group),
+    mut each: impl FnMut(Rgb, Vec3, u32),
 ) {
     // Media attenuate the light of the bulb's points differently.
     let u = if scene.survey.media { draws.one(Purpose::Bulb) } else { 0.5 };
-    scene.lights.for_each_bulb(start.origin, start.direction, reach, camera, u, |radiance, distance, group| {
+    scene.lights.for_each_bulb(start.origin, start.direction, reach, camera, u, |radiance, distance, emitter| {
         let between = ShadowRay {
             start: *start,
             tmax: distance,
@@ -96,7 +95,7 @@ pub(in crate::transport) fn for_each_bulb(
         };
         let light = radiance * shadow_ray(scene, &between).transmittance;
         if light != Rgb::ZERO {
-            each(light, start.origin + start.direction * distance, group);
+            each(light, start.origin + start.direction * distance, emitter);
         }
     });
 }

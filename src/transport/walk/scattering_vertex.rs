@@ -71,7 +71,7 @@ pub trait ScatterPoint {
     /// Whether `w` points to the other side of the surface than `wo`.
     fn crosses(&self, w: Vec3) -> bool;
     /// The vertex as a receiver of direct light, for the choice of a light.
-    fn receiver(&self) -> Receiver;
+    fn receiver(&self, scene: &Scene) -> Receiver;
     /// Whether back-face culling hides the surface from a camera along `wi`.
     fn is_culled(&self, _scene: &Scene, _wi: Vec3) -> bool {
         false
@@ -106,7 +106,7 @@ pub trait ScatterPoint {
     fn sample_light(&self, scene: &Scene) -> Option<DirectSample> {
         let draws = self.draws();
         let (choice, point) = (draws.one_fine(Purpose::LightChoice), draws.two(Purpose::LightPoint));
-        scene.lights.sample_direct(&scene.shapes, &scene.materials, &self.receiver(), choice, point)
+        scene.lights.sample_direct(&scene.shapes, &scene.materials, &self.receiver(scene), choice, point)
     }
 
     /// Traces a shadow ray to a light of [`ScatterPoint::sample_light`].
@@ -170,8 +170,9 @@ impl ScatterPoint for Vertex<'_, '_> {
     }
 
     #[inline]
-    fn receiver(&self) -> Receiver {
-        Receiver { n: lit_side(self.shading, self.surface.ng, self.wo), ..Receiver::anywhere(self.surface.p) }
+    fn receiver(&self, scene: &Scene) -> Receiver {
+        let links = scene.receives(self.surface.instance);
+        Receiver { n: lit_side(self.shading, self.surface.ng, self.wo), links, ..Receiver::anywhere(self.surface.p) }
     }
 
     #[inline]
@@ -265,8 +266,9 @@ impl ScatterPoint for MediumVertex {
     const IN_MEDIUM: bool = true;
 
     #[inline]
-    fn receiver(&self) -> Receiver {
-        Receiver { p: self.arrival.p, n: Vec3::ZERO, in_medium: true }
+    fn receiver(&self, scene: &Scene) -> Receiver {
+        let links = self.arrival.interior.receives(scene);
+        Receiver { in_medium: true, links, ..Receiver::anywhere(self.arrival.p) }
     }
 
     #[inline]

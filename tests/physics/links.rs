@@ -1,0 +1,186 @@
+//! Light linking: lights that shine on some objects only, by all methods.
+//!
+//! The closed form is checked by t tests over independent seeds at a family-wise error rate of 0.1 % (Sidak); besides
+//! noise they allow for the error of kernels where photons are gathered (3 %). Every check must reject a picture that is
+//! off by 40 %.
+
+use crate::support;
+
+use caustique::geometry::Mesh;
+use caustique::material::{Material, MediumParameters};
+use caustique::math::{DVec3, Rgb, Vec3};
+use caustique::render::{Control, InitialBandwidth, Levels, Method, Settings, render};
+use caustique::scene::Scene;
+use caustique::scene::description::{Description, Linked, Links, PunctualKind, PunctualLight};
+use std::f64::consts::PI;
+use std::sync::Arc;
+use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
+use support::stats::{mean_and_error, sidak, t_critical};
+
+const ERROR_RATE: f64 = 1e-3;
+const SEEDS: u64 = 8;
+/// Field of view of the camera above the floors (degrees).
+const VIEW: f32 = 60.0;
+
+/// Adds an object in a collection of its own name.
+fn put(description: &mut Description, name: &str, mesh: Mesh, material: Material) {
+    add(description, name, mesh, material);
+    let links = Links { collections: vec![name.into()], ..Links::default() };
+    description.instances.last_mut().expect("the instance was added").links = Some(Arc::new(links));
+}
+
+fn receivers(include: &[&str], exclude: &[&str]) -> Option<Arc<Links>> {
+    let names = |names: &[&str]| names.iter().map(|&name| name.into()).collect();
+    let receivers = Linked { include: names(include), exclude: names(exclude) };
+    Some(Arc::new(Links { receivers, ..Links::default() }))
+}
+
+fn settings(method: Method) -> Settings {
+    Settings {
+        method,
+        photons: 1000,
+        // These two have as many light paths as pixels.
+        iterations: Some(if matches!(method, Method::Light | Method::Bpm) { 2000 } else { 16 }),
+        levels: Levels::new(1),
+        initial_bandwidth: InitialBandwidth::Fixed(0.15),
+        alpha: method.default_alpha(),
+        ..Settings::default()
+    }
+}
+
+/// The pixels of a picture of `size` x `size` pixels.
+fn picture(scene: &Scene, settings: &Settings, size: u32) -> Vec<caustique::math::DVec3> {
+    let camera = scene.camera(&square(size)).expect("a camera");
+    let rendered = render(scene, &camera, settings, |_, _| Control::Continue);
+    rendered.pixels.iter().map(|pixel| pixel.mean(0)).collect()
+}
+
+/// Two floors below a light of each kind. The camera sees the middle of one of them.
+fn floors(light: &str, links: Option<Arc<Links>>, seen: f64) -> Description {
+    let mut scene = Description::default();
+    for (name, x) in [("left", -2.0), ("right", 0.0)] {
+        put(&mut scene, name, quad(Vec3::new(x, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0), matte(0.5, 0.0));
+    }
+    let kind = match light {
+        "sun" => PunctualKind::Sun { angle: 0.02 },
+        _ => PunctualKind::Point,
+    };
+    let radius = if light == "ball" { 0.05 } else { 0.0 };
+    if light == "panel" {
+        // It faces down; its intensity along its normal is 4.
+        let quad = quad(Vec3::new(-0.05, 2.0, -0.05), Vec3::X * 0.1, Vec3::Z * 0.1);
+        add(&mut scene, light, quad, matte(0.0, 400.0));
+        scene.instances[2].links = links;
+    } else {
+        let pass_through = light == "ball";
+        let place = point_light(DVec3::new(0.0, 2.0, 0.0), 4.0);
+        scene.lights.push(PunctualLight { kind, radius, pass_through, links, ..place });
+        if light == "sun" {
+            let down = glam::DQuat::from_rotation_x(-0.5 * PI);
+            scene.lights[0].to_world = caustique::math::DAffine3::from_quat(down);
+        }
+    }
+    scene.cameras.push(look_at(DVec3::new(seen, 1.0, 0.0), DVec3::new(seen, 0.0, 0.0), VIEW));
+    scene
+}
+
+/// The mean radiance of the part of the lit floor that the camera sees.
+fn lit(light: &str) -> f64 {
+    const POINTS: u32 = 64;
+    let half = f64::from(0.5 * VIEW).to_radians().tan();
+    let side = |i: u32| half * (2.0 * (f64::from(i) + 0.5) / f64::from(POINTS) - 1.0);
+    let points = (0..POINTS * POINTS).map(|i| (0.7 + side(i % POINTS)).powi(2) + side(i / POINTS).powi(2));
+    let irradiance = |distance2: f64| {
+        let cos = 2.0 / (4.0 + distance2).sqrt();
+        match light {
+            "sun" => 4.0,
+            "panel" => cos.powi(4),
+            _ => cos.powi(3),
+        }
+    };
+    0.5 / PI * points.map(irradiance).sum::<f64>() / f64::from(POINTS * POINTS)
+}
+
+#[test]
+fn lights_shine_on_the_objects_that_they_are_linked_to_by_all_methods() {
+    let linked = [receivers(&["left"], &[]), receivers(&[], &["right"]), receivers(&["left", "right"], &["right"])];
+    let kinds = ["point", "ball", "sun", "panel"];
+    let methods = Method::ALL;
+    let critical = t_critical(sidak(ERROR_RATE, kinds.len() * methods.len()), 1, SEEDS as f64 - 1.0);
+    let mut faults = Vec::new();
+    for (index, kind) in kinds.into_iter().enumerate() {
+        let links = &linked[index % linked.len()];
+        let [left, right] = [-0.7, 0.7].map(|seen| build(floors(kind, links.clone(), seen)));
+        for &method in methods {
+            let settings = settings(method);
+            let dark = picture(&right, &settings, 4);
+            assert!(dark.iter().all(|&pixel| pixel == DVec3::ZERO), "{kind}, {method:?}: the other floor is lit");
+            let mean = |seed| {
+                picture(&left, &Settings { seed, ..settings.clone() }, 4).iter().map(|p| p.y).sum::<f64>() / 16.0
+            };
+            let (mean, error) = mean_and_error(&(1..=SEEDS).map(mean).collect::<Vec<f64>>());
+            let [mean, error] = [mean, error].map(|value| value / lit(kind));
+            println!("{kind}, {method:?}: {mean:.4} +- {error:.4}");
+            let passes = |expected: f64| (mean - expected).abs() < critical * error + 0.03;
+            if !passes(1.0) || passes(1.4) || passes(0.6) {
+                faults.push(format!("{kind}, {method:?}: {mean:.4} +- {error:.4}"));
+            }
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+/// A floor, a mirror, a ball of glass and a cube of fog, under lights of all kinds that shine on the objects in `on` alone.
+/// Cameras do not see the lights.
+fn room(on: Option<&str>) -> Scene {
+    let links = on.and_then(|name| receivers(&[name], &[]));
+    let mut scene = Description::default();
+    put(&mut scene, "floor", quad(Vec3::new(-2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0), matte(0.8, 0.0));
+    put(&mut scene, "mirror", quad(Vec3::new(-2.0, 0.0, -1.5), Vec3::X * 4.0, Vec3::Y * 2.0), mirror());
+    put(&mut scene, "ball", sphere(Vec3::new(0.0, 0.6, 0.0), 0.5, 16), glass(1.5));
+    let medium = MediumParameters { sigma_a: Rgb::splat(0.2), sigma_s: Rgb::splat(2.0), g: 0.3 };
+    let fog = Material { medium: Some(medium), ..glass(1.0) };
+    put(&mut scene, "fog", cuboid(Vec3::new(-1.5, 0.1, 0.0), Vec3::new(-0.7, 0.9, 0.8), false), fog);
+    let light = |p: DVec3, kind, radius| PunctualLight {
+        kind,
+        radius,
+        bulb: radius > 0.0 && kind != PunctualKind::Point,
+        pass_through: true,
+        hidden_from_camera: true,
+        links: links.clone(),
+        ..point_light(p, 4.0)
+    };
+    let edge = caustique::light::SpotEdge::default();
+    scene.lights.push(light(DVec3::new(-1.0, 2.0, 0.5), PunctualKind::Point, 0.1));
+    scene.lights.push(light(DVec3::new(0.0, 3.0, 0.2), PunctualKind::Spot { inner: 0.5, outer: 0.7, edge }, 0.1));
+    let mut sun = light(DVec3::ZERO, PunctualKind::Sun { angle: 0.05 }, 0.0);
+    sun.to_world = caustique::math::DAffine3::from_quat(glam::DQuat::from_rotation_x(-1.2));
+    scene.lights.push(PunctualLight { intensity: Rgb::ONE, bulb: false, ..sun });
+    add(&mut scene, "panel", quad(Vec3::new(0.5, 2.5, -0.5), Vec3::X, Vec3::Z), matte(0.0, 5.0));
+    let panel = scene.instances.last_mut().expect("the instance was added");
+    (panel.links, panel.hidden_from_camera) = (links, true);
+    scene.cameras.push(look_at(DVec3::new(0.3, 1.6, 3.5), DVec3::new(0.0, 0.5, 0.0), 45.0));
+    build(scene)
+}
+
+/// Every path has one first receiver, so pictures whose lights shine on one object each sum to the whole: of the same
+/// random numbers to the rounding error, in every pixel.
+#[test]
+fn pictures_of_single_receivers_sum_to_the_whole() {
+    for method in [Method::Path, Method::Bdpt, Method::Light, Method::Vcm, Method::Sppm] {
+        let settings = Settings { iterations: Some(4), ..settings(method) };
+        let [whole, parts @ ..] = [None, Some("floor"), Some("mirror"), Some("ball"), Some("fog")]
+            .map(|on| picture(&room(on), &settings, 16));
+        let scale = whole.iter().map(|pixel| pixel.y).sum::<f64>() / whole.len() as f64;
+        for (index, whole) in whole.iter().enumerate() {
+            let sum: DVec3 = parts.iter().map(|part| part[index]).sum();
+            let what = format!("{method:?}, pixel {index}: {sum} of {whole}");
+            assert!((sum - *whole).abs().max_element() < 1e-4 * (whole.max_element() + scale), "{what}");
+        }
+        for (part, name) in parts.iter().zip(["floor", "mirror", "ball", "fog"]) {
+            let sum: f64 = part.iter().map(|pixel| pixel.y).sum();
+            println!("{method:?}, {name}: {:.3}", sum / (scale * whole.len() as f64));
+            assert!(sum > 0.0, "{method:?}: nothing receives light on the {name}");
+        }
+    }
+}
