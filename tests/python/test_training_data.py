@@ -9,7 +9,7 @@ import numpy as np
 
 import support  # noqa: F401 (adds scripts to the path)
 
-from lab.train import data, families, normalise, views
+from lab.train import bound, data, families, finish_data, finish_views, normalise, views
 
 
 def arrays(rng, side=16):
@@ -80,6 +80,83 @@ class Data(unittest.TestCase):
             for name, value in stored.items():
                 np.testing.assert_array_equal(found[name], value)
                 self.assertEqual(found[name].dtype, value.dtype)
+
+
+class FinishData(unittest.TestCase):
+    def picture(self, rng, side=16):
+        """The layers of a picture of four iterations, with an exact row, a black one without coverage, and background."""
+        plane = lambda: rng.uniform(0.1, 1, (side, side)).astype(np.float32)
+        layers = ("", "Noisy.", "Variance1.", "albedo.", "TransmissionColor.", *(f"Quarter{k}." for k in range(1, 5)))
+        picture = {f"{layer}{c}": plane() for layer in layers for c in "RGB"} | {f"normal.{c}": plane() for c in "XYZ"}
+        picture |= {"depth.Z": plane(), "A": np.ones((side, side), np.float32), "iterations": 4}
+        for c in "RGB":
+            picture[f"Variance1.{c}"][:2], picture[f"Noisy.{c}"][1] = 0, 0
+            picture[f"Variance1.{c}"][5, 5] = -1
+        picture["A"][1], picture["depth.Z"][2] = 0, 1e10
+        return picture
+
+    def test_views_have_two_windows_of_different_methods_and_all_numbers_of_iterations(self):
+        chosen = data.views(Path("/nowhere"), 5, finish_data.View)
+        self.assertTrue(all(len(set(view.methods)) == finish_data.METHODS_OF_VIEW for view in chosen))
+        counts = {method: sum(method in view.methods for view in chosen) for method in finish_data.METHODS}
+        self.assertEqual(max(counts, key=counts.get), "vcm")
+        self.assertGreater(min(counts.values()), len(chosen) / 5)
+        long = np.mean([view.iterations == finish_data.ITERATIONS for view in chosen if not view.held_out])
+        self.assertTrue(0.2 < long < 0.5, long)
+
+    def test_a_target_by_bdpt_has_fewer_light_paths_in_a_large_picture(self):
+        windows = {"path": {"width": 1920, "height": 1080}, "bdpt": {"width": 240, "height": 135}}
+        note = {"target_method": {"method": "bdpt"}, "windows": windows}
+        self.assertEqual(data.target_options(note, "path")["light_paths"], 1 / 16)
+        self.assertEqual(data.target_options(note, "bdpt")["light_paths"], 1)
+
+    def test_limits_widen_for_few_samples(self):
+        # Student's quantiles that exclude 0.27 %, from tables.
+        for samples, expected in ((2, 235.8), (3, 19.21), (4, 9.219), (8, 4.530), (32, 3.261), (1_000_000, 3.0)):
+            self.assertAlmostEqual(bound.limit(samples) / expected, 1, delta=1e-3)
+
+    def test_the_spread_is_the_percentile_of_the_window_and_zero_where_the_estimate_is_exact(self):
+        rng = np.random.default_rng(8)
+        mean, deviation = rng.uniform(0, 1, (2, 12, 15, 3)).astype(np.float32)
+        deviation[3], deviation[4, 4] = 0, np.nan
+        found = bound.spread(mean, deviation, 8)
+        self.assertTrue((found[3] == 0).all() and np.isinf(found[4, 4]).all())
+        for y, x, c in ((0, 0, 0), (6, 7, 1), (11, 14, 2), (8, 2, 0)):
+            window = (slice(max(y - 3, 0), y + 4), slice(max(x - 3, 0), x + 4), c)
+            errors = np.where(np.isnan(deviation[window]), np.inf, deviation[window])
+            errors = np.sort(np.where(mean[window] - mean[y, x, c] > bound.limit(8) * errors, 0, errors), axis=None)
+            around = errors[int(0.8 * (errors.size - 1) + 0.5)]
+            self.assertEqual(found[y, x, c], max(deviation[y, x, c], around))
+
+    def test_independent_noise_has_the_least_correlation_and_shared_noise_a_large_one(self):
+        noise = np.random.default_rng(9).uniform(0, 1, (4, 60, 60, 3)).astype(np.float32)
+        blocks = noise[:, :20, :20].repeat(3, 1).repeat(3, 2)
+        independent, shared = bound.correlation(noise).mean(), bound.correlation(blocks).mean()
+        self.assertLess(independent, 0.2)
+        self.assertGreater(shared, 0.45)
+        noise[2] = 0
+        self.assertTrue((bound.correlation(noise) == np.float32(1 / 9)).all())
+
+    def test_stacks_of_a_picture_give_samples_of_the_network(self):
+        rng = np.random.default_rng(10)
+        note = {"exposure": 2.0, "depth": 0.5, "parts": ["Direct"]}
+        picture = self.picture(rng)
+        for c in "RGB":
+            picture[f"Direct.{c}"] = picture[f"Noisy.{c}"] / 2
+        arrays = {key: value[None] for key, value in finish_data.stack(picture, note).items()}
+        arrays |= {"iterations": np.array([4]), "halves": rng.uniform(0, 1, (2, 16, 16, 3)).astype(np.float32)}
+        stack = views.snapshot(arrays, 0)
+        image, halves, transmission = finish_views.sample(views.augment(stack, rng))
+        self.assertEqual(image.shape, (sum(finish_views.PLANES.values()), 16, 16))
+        self.assertEqual((halves.shape, transmission.shape), ((2, 3, 16, 16), (1, 16, 16)))
+        self.assertTrue(np.isfinite(image).all() and (image[:6] >= 0).all())
+        image, _, _ = finish_views.sample(stack)
+        groups = dict(zip(finish_views.PLANES, np.split(image, np.cumsum(list(finish_views.PLANES.values()))[:-1])))
+        np.testing.assert_allclose(groups["mean"][0], 2 * picture["Noisy.R"], rtol=1e-3)
+        np.testing.assert_allclose(groups["effects"][1], groups["mean"].mean(0) / 2, rtol=2e-3)
+        self.assertTrue((groups["reach"][:, 0] == 0).all() and (groups["reach"][:, 1] == 0).all())
+        self.assertEqual(groups["reach"][0, 5, 5], np.float16(data.LARGEST))
+        self.assertTrue((groups["iterations"] == 2).all())
 
 
 class Samples(unittest.TestCase):

@@ -1,6 +1,6 @@
-"""Trains the networks of the combiner in turns, at the lowest priority, and stores their errors on held-out views. A
-repeated run continues where the last one stopped, also on another machine. On a machine with a GPU and many cores,
---together trains all at once, and --seconds ends their schedules after a time.
+"""Trains the networks of the combiner or, with --finish, that of the finish, in turns, at the lowest priority, and stores
+their errors on held-out views. A repeated run continues where the last one stopped, also on another machine. On a machine
+with a GPU and many cores, --together trains all at once, and --seconds ends their schedules after a time.
 
 It needs views of scripts/lab.sh training_data; those that are finished later join. The run `paper` is the paper's
 network with its loss, the others compare inputs and pairs of pictures with the compact network
@@ -18,8 +18,8 @@ from pathlib import Path
 from ..cache import installed
 from ..options import names, options
 from ..record import record
-from ..train import views
-from .training_data import FOLDER
+from ..train import finish_views, views
+from .training_data import FINISH_FOLDER, FOLDER
 
 # Options of each run. All but `paper`, whose steps take forty times as long, have the same number of steps.
 STEPS = ["--steps", 16_000]
@@ -35,18 +35,28 @@ RUNS = {
     "deep-single": ["--pairs", "deep-single", "--methods", "sppm", "--paths", 1, *STEPS],
     "deep-multi": ["--pairs", "deep-multi", "--methods", "sppm", "--paths", 1, *STEPS],
 }
+# The run of the network of the finish.
+FINISH_RUNS = {"finish": ["--side", 96, "--batch", 6, "--rate", 1e-3, "--steps", 40_000]}
 UNLIMITED = 10**9
 # Minutes of a run before it is the next one's turn.
 TURN = 20.0
 
 
 def add_arguments(parser):
-    parser.add_argument("--folder", type=Path, default=FOLDER, help=f"folder of data and runs [default: {FOLDER}]")
+    parser.add_argument("--finish", action="store_true", help="train the network of the finish")
+    parser.add_argument(
+        "--folder", type=Path, help=f"folder of data and runs [default: {FOLDER}; with --finish {FINISH_FOLDER}]"
+    )
     parser.add_argument("--hours", type=float, default=10.0, help="hours of this call [default: 10]")
-    parser.add_argument("--runs", type=names, default=list(RUNS), help=f"runs to train [default: {','.join(RUNS)}]")
+    parser.add_argument("--runs", type=names, help=f"runs to train [default: {','.join(RUNS)}; with --finish finish]")
     parser.add_argument("--threads", type=int, default=1, help="threads [default: 1]")
     parser.add_argument("--together", action="store_true", help="train all runs at the same time")
     parser.add_argument("--seconds", type=float, help="seconds of a run, in place of its steps")
+
+
+def known_runs():
+    """The options of the runs that this call can train, by name."""
+    return FINISH_RUNS if options.finish else RUNS
 
 
 def last_line(run):
@@ -57,7 +67,7 @@ def last_line(run):
 
 def steps(run):
     """The number of steps of a whole run."""
-    words = RUNS[run]
+    words = known_runs()[run]
     return words[words.index("--steps") + 1]
 
 
@@ -66,6 +76,8 @@ def trainable(run):
     line = last_line(run)
     if line and (line["seconds"] >= options.seconds if options.seconds else line["step"] >= steps(run)):
         return False
+    if options.finish:
+        return bool(finish_views.files(options.folder, False))
     paths, pairs = 1 if "--paths" in RUNS[run] else 2, run if run.startswith("deep") else "multi"
     return bool(views.files(options.folder, False, ["sppm"], [paths], pairs))
 
@@ -73,10 +85,11 @@ def trainable(run):
 def start(run, minutes):
     """Starts to train a run for at most some minutes."""
     words = ["--data", options.folder, "--out", options.folder / "runs" / run, "--threads", options.threads]
-    words += ["--minutes", f"{minutes:.1f}", *RUNS[run]]
+    words += ["--minutes", f"{minutes:.1f}", *known_runs()[run]]
     if options.seconds:
         words += ["--seconds", options.seconds, "--steps", UNLIMITED]
-    line = [installed(".venv-train") or sys.executable, "-m", "lab.train.train", *words]
+    module = "lab.train.finish_train" if options.finish else "lab.train.train"
+    line = [installed(".venv-train") or sys.executable, "-m", module, *words]
     return subprocess.Popen(list(map(str, line)))
 
 
@@ -84,9 +97,11 @@ def main():
     os.nice(19)
     if not installed(".venv-train") and not importlib.util.find_spec("torch"):
         raise SystemExit("training needs PyTorch; scripts/setup.sh train installs it")
-    unknown = [run for run in options.runs if run not in RUNS]
+    options.folder = options.folder or (FINISH_FOLDER if options.finish else FOLDER)
+    options.runs = options.runs or list(known_runs())
+    unknown = [run for run in options.runs if run not in known_runs()]
     if unknown:
-        raise SystemExit(f"--runs {unknown[0]} is not one of {', '.join(RUNS)}")
+        raise SystemExit(f"--runs {unknown[0]} is not one of {', '.join(known_runs())}")
     end, failed = time.monotonic() + 3600 * options.hours, set()
     while time.monotonic() < end:
         runs = [run for run in options.runs if run not in failed and trainable(run)]
@@ -100,6 +115,10 @@ def main():
     for run in options.runs:
         print(f"{run:14}{'failed; ' if run in failed else ''}{json.dumps(last_line(run))}")
     lines = {run: last_line(run) for run in options.runs if last_line(run)}
-    stacks = {held_out: len({item[0] for item in views.files(options.folder, held_out)}) for held_out in (False, True)}
-    record("training", {"views": stacks[False], "held_out_views": stacks[True], "runs": lines})
+    files = finish_views.files if options.finish else views.files
+    stacks = {held_out: len({item[0] for item in files(options.folder, held_out)}) for held_out in (False, True)}
+    record(
+        "training_finish" if options.finish else "training",
+        {"views": stacks[False], "held_out_views": stacks[True], "runs": lines},
+    )
     return 1 if failed else 0

@@ -1,5 +1,5 @@
-"""Renders the training data of the combiner: random scenes in families, at the lowest priority. A repeated run
-continues where the last one stopped, and renders with the same copy of the program.
+"""Renders the training data of the combiner or, with --finish, of the network of the finish: random scenes in families,
+at the lowest priority. A repeated run continues where the last one stopped, and renders with the same copy of the program.
 
 A view takes about a core-minute, of one thread. Training can start on the views that are finished. With --part 1/2 and
 --part 2/2, two runs render different views at the same time.
@@ -10,13 +10,14 @@ from pathlib import Path
 
 from ..cache import BIN, CACHE, Failed
 from ..options import options
-from ..train import data
+from ..train import data, finish_data
 
-FOLDER = CACHE / "training"
+FOLDER, FINISH_FOLDER = CACHE / "training", CACHE / "training-finish"
 
 
 def add_arguments(parser):
-    parser.add_argument("--folder", type=Path, default=FOLDER, help=f"folder of the data [default: {FOLDER}]")
+    parser.add_argument("--finish", action="store_true", help="data for the network of the finish")
+    parser.add_argument("--folder", type=Path, help=f"folder of the data [default: {FOLDER}, {FINISH_FOLDER}]")
     parser.add_argument("--views", type=int, default=5, help="views of each family [default: 5]")
     parser.add_argument("--only", help="a family to render alone")
     parser.add_argument("--part", type=part, default=(1, 1), help="I/N: every Nth view, from the Ith on [default: 1/1]")
@@ -32,11 +33,13 @@ def part(text):
 
 def main():
     os.nice(19)
-    maker = data.Maker(options.folder, BIN)
+    kind = finish_data if options.finish else data
+    folder = options.folder or (FINISH_FOLDER if options.finish else FOLDER)
+    maker = kind.Maker(folder, BIN)
     first, step = options.part
-    chosen = data.views(options.folder, options.views)[first - 1 :: step]
+    chosen = data.views(folder, options.views, kind.View)[first - 1 :: step]
     chosen = [view for view in chosen if options.only in (None, view.family)]
-    done = data.manifest(options.folder)
+    done = data.manifest(folder)
     for view in chosen:
         if view.name in done:
             continue

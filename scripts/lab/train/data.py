@@ -45,11 +45,10 @@ PHOTONS = 100_000
 # Additive parts, in the order in which the arrays hold them.
 PARTS = ("Emission", "Direct", "Indirect", "Caustic", "Volume")
 # Least and greatest width of the picture of which a window is rendered. vcm traces one light path per camera path, so a
-# window of a large picture would get too few of them.
-WIDTHS = {"sppm": (320, 1920), "vcm": (240, 480)}
-# Core-seconds of a target's half. Training averages over the noise of many targets, but errors on held-out views are
-# estimated from few.
-TARGET_SECONDS, HELD_OUT_SECONDS = 2.0, 8.0
+# window of a large picture would get too few of them; bdpt traces those of the whole picture, which takes long.
+WIDTHS = {"sppm": (320, 1920), "vcm": (240, 480), "path": (320, 1920), "bdpt": (240, 320)}
+# Methods of the noisy stacks of levels.
+METHODS = ("sppm", "vcm")
 # Largest stored value; the maximum of float16 is 65504.
 LARGEST = 6e4
 # Least share of the pixels that are not black, and attempts to find a scene with that.
@@ -70,20 +69,21 @@ class View:
         long = self.rng("iterations").random() < share
         self.iterations = ITERATIONS if long else ITERATIONS[:SHORT]
         # The first view of a family has a window by each method, others by one: more scenes are worth more than that.
-        self.methods = list(WIDTHS) if index == 0 else [str(self.rng("method").choice(list(WIDTHS)))]
+        self.methods = list(METHODS) if index == 0 else [str(self.rng("method").choice(METHODS))]
 
     def rng(self, *words):
         """A random generator of the view."""
         return np.random.default_rng([self.index, *self.family.encode(), *(b for word in words for b in word.encode())])
 
 
-def views(folder, count):
-    """`count` views of every family and the scenes of scenes/, so that any first part of the list has all families."""
+def views(folder, count, view=View):
+    """`count` views, of the class `view`, of every family and the scenes of scenes/, so that any first part of the list has
+    all families."""
     files = [*sorted((ROOT / "scenes").glob("*.glb")), *sorted((ROOT / "scenes" / "second").glob("*.glb"))]
     found = []
     for index in range(count):
-        found += [View(folder, family, index) for family in families.names()]
-        found += [View(folder, f"scenes_{file.stem}", index, file) for file in files[index::count]]
+        found += [view(folder, family, index) for family in families.names()]
+        found += [view(folder, f"scenes_{file.stem}", index, file) for file in files[index::count]]
     return found
 
 
@@ -94,6 +94,10 @@ def independent_file(method, seed):
 
 class Maker:
     """Renders views. All of them use the same program, of which the folder of the data has a copy."""
+
+    # Core-seconds of a target's half. Training averages over the noise of many targets, but errors on held-out views
+    # are estimated from few.
+    target_seconds, held_out_seconds = 2.0, 8.0
 
     def __init__(self, folder, binary):
         self.folder, self.binary = folder, folder / "caustique"
@@ -129,6 +133,12 @@ class Maker:
             if not (view.folder / f"{method}-target.npz").exists():
                 window["target"] = self.target(view, note, method, scene, work)
                 self.store(view, note)
+        self.noisy(view, note, scene, work)
+        self.finish(view, work)
+
+    def noisy(self, view, note, scene, work):
+        """Renders the noisy stacks of a view that are missing."""
+        for method in view.methods:
             for seed in PATHS:
                 if not (view.folder / f"{method}-seed{seed}.npz").exists():
                     self.stacks(view, note, method, seed, scene, work)
@@ -137,7 +147,6 @@ class Maker:
         if "sppm" in view.methods and not deep.exists():
             write(deep, self.independent(view, note, DEEP_SEED, scene, work))
             self.store(view, note)
-        self.finish(view, work)
 
     def finish(self, view, work):
         """Removes the temporary files of a view, and adds the others to the manifest."""
@@ -199,17 +208,15 @@ class Maker:
 
     def target(self, view, note, method, scene, work):
         """Renders both halves of the target of a window; returns their method and iterations."""
-        words, halves, counts = note["target_method"], [], []
+        words, halves, counts = target_options(note, method), [], []
         for half in (1, 2):
             out, saved = work / "half.exr", work / "half.saved"
             saved.unlink(missing_ok=True)
-            settings = (
-                place(note, method) | words | {"levels": 1, "no_finish": True, "layers": "beauty", "checkpoint": saved}
-            )
+            settings = place(note, method) | words | {"no_finish": True, "layers": "beauty", "checkpoint": saved}
             settings["seed"] = 7000 + half
             self.render(scene, out, **settings, iterations=8)
             last = header_of(out)["history"][-1]
-            seconds = HELD_OUT_SECONDS if view.held_out else TARGET_SECONDS
+            seconds = self.held_out_seconds if view.held_out else self.target_seconds
             count = min(4 * math.ceil(2 * seconds / max(last["cpu_seconds"], 1e-3)), 8192)
             picture = self.render(scene, out, **settings, resume=saved, iterations=max(count, 16))
             halves.append(rgb(picture, "") * np.float32(note["exposure"]))
@@ -248,7 +255,7 @@ class Maker:
         for iterations in view.iterations:
             resume = saved if found else None
             picture = self.render(scene, out, **settings, checkpoint=saved, iterations=iterations, resume=resume)
-            found.append(arrays(picture))
+            found.append(arrays(picture | {"iterations": iterations}))
         return {key: np.stack([one[key] for one in found]) for key in found[0]} | {
             "iterations": np.array(view.iterations)
         }
@@ -307,6 +314,16 @@ def target_method(simulated):
     if not simulated.get("sds", True):
         return {"method": "bdpt"}
     return {"method": "vcm", "guide": "on", "alpha": 0.5}
+
+
+def target_options(note, method):
+    """The options of the target of a window. bdpt traces the light paths of the whole picture: fewer for each pixel of a
+    large one, of which the window is a small part."""
+    words, known = note["target_method"], note["windows"][method]
+    if words["method"] != "bdpt":
+        return words | {"levels": 1}
+    share = 4 * SIDE**2 / (known["width"] * known["height"])
+    return words | {"light_paths": min(max(round(16 * share), 1), 16) / 16}
 
 
 def window(view, method, levels):

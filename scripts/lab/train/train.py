@@ -23,22 +23,6 @@ from .pairs import PAIRS
 DECAY = 0.999  # of the moving average of the weights, which is validated and exported
 # Seconds between checkpoints, most seconds between validations, and their least number in a run.
 SAVE_SECONDS, VALIDATE_SECONDS, VALIDATIONS = 120, 1200, 4
-# Options that belong to a run and are stored with it.
-STORED = (
-    "arch",
-    "pairs",
-    "version",
-    "window",
-    "wide",
-    "squared",
-    "rate",
-    "batch",
-    "side",
-    "methods",
-    "paths",
-    "steps",
-    "seed",
-)
 
 
 def relative_loss(image, target):
@@ -68,11 +52,27 @@ def moving_average(average, new, count):
     return torch.lerp(average, new, 1 - min(DECAY, (1 + float(count)) / (10 + float(count))))
 
 
-def arguments():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def common_arguments(description):
+    """A parser of the arguments that all trainers have."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", required=True, type=Path)
     parser.add_argument("--init", help="checkpoint with the initial network")
     parser.add_argument("--out", required=True, type=Path)
+    parser.add_argument("--minutes", type=float, default=60, help="minutes of this call")
+    parser.add_argument("--steps", type=int, default=40_000, help="steps of the learning-rate schedule")
+    parser.add_argument(
+        "--seconds", type=float, default=math.inf, help="seconds of the schedule, if it ends before its steps"
+    )
+    parser.add_argument("--batch", type=int, default=8)
+    parser.add_argument("--side", type=int, default=64, help="pixels of a training crop's side")
+    parser.add_argument("--rate", type=float, default=5e-4, help="largest learning rate (Adam)")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--threads", type=int, default=1, help="threads; 0 uses all cores")
+    return parser
+
+
+def arguments():
+    parser = common_arguments(__doc__)
     parser.add_argument("--arch", choices=["compact", "paper"], default="compact")
     parser.add_argument("--pairs", choices=list(PAIRS), default="multi")
     parser.add_argument("--version", type=int, help="version of the input (normalise.py); default: the least")
@@ -82,27 +82,34 @@ def arguments():
     parser.add_argument(
         "--paths", nargs="+", type=int, default=[2], help="camera paths of the noisy stacks: 1, 2 or both"
     )
-    parser.add_argument("--minutes", type=float, default=60, help="minutes of this call")
-    parser.add_argument("--steps", type=int, default=40_000, help="steps of the learning-rate schedule")
-    parser.add_argument(
-        "--seconds", type=float, default=math.inf, help="seconds of the schedule, if it ends before its steps"
-    )
-    parser.add_argument("--batch", type=int, default=8)
-    parser.add_argument("--side", type=int, default=64, help="pixels of a training crop's side")
     parser.add_argument("--squared", type=float, default=0.5, help="weight of the squared error in the loss, 0 to 1")
-    parser.add_argument("--rate", type=float, default=5e-4, help="largest learning rate (Adam)")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--threads", type=int, default=1, help="threads; 0 uses all cores")
     return parser.parse_args()
 
 
 class Run:
     """A training run: network, optimiser and counts, which a checkpoint holds."""
 
+    # Options that belong to a run and are stored with it.
+    stored = (
+        "arch",
+        "pairs",
+        "version",
+        "window",
+        "wide",
+        "squared",
+        "rate",
+        "batch",
+        "side",
+        "methods",
+        "paths",
+        "steps",
+        "seed",
+    )
+
     def __init__(self, args):
         self.args, self.device = args, "cuda" if torch.cuda.is_available() else "cpu"
         torch.manual_seed(args.seed)
-        net = model.build(args.arch, args.pairs, args.version, window=args.window, wide=args.wide).to(self.device)
+        net = self.build().to(self.device)
         self.net, self.average = net, torch.optim.swa_utils.AveragedModel(net, avg_fn=moving_average)
         self.optimiser = torch.optim.Adam(net.parameters(), lr=args.rate)
         self.step, self.seconds, self.machines, self.losses = 0, 0.0, [], []
@@ -115,6 +122,29 @@ class Run:
         if self.device not in self.machines:
             self.machines.append(self.device)
 
+    def build(self):
+        """The untrained network."""
+        args = self.args
+        return model.build(args.arch, args.pairs, args.version, window=args.window, wide=args.wide)
+
+    def loss(self, batch):
+        """The loss of a batch."""
+        return loss_of(self.net, batch, self.args.squared)
+
+    def validate(self):
+        """Figures of the network on held-out views, by name."""
+        return validate(self.average.module, self.args.data, self.args.methods, self.args.paths, self.device)
+
+    def description(self):
+        """What a checkpoint says of the network and its data."""
+        count = len({item[0] for item in views.files(self.args.data, False)})
+        return {
+            "version": self.net.version,
+            "window": self.net.form.window,
+            "levels": self.net.levels,
+            "data": f"{count} views of {self.args.data.name}",
+        }
+
     def file(self):
         return self.args.out / "last.pt"
 
@@ -126,12 +156,8 @@ class Run:
         self.step, self.seconds, self.machines = saved["steps"], saved["seconds"], saved["machines"]
 
     def save(self):
-        known = {name: getattr(self.args, name) for name in STORED} | {
-            "version": self.net.version,
-            "window": self.net.form.window,
-        }
-        state = known | {
-            "levels": self.net.levels,
+        state = {name: getattr(self.args, name) for name in self.stored} | self.description()
+        state |= {
             "model": self.net.state_dict(),
             "average": self.average.state_dict(),
             "best": self.average.module.state_dict(),
@@ -140,7 +166,6 @@ class Run:
             "schedule": self.args.steps,
             "seconds": self.seconds,
             "machines": self.machines,
-            "data": f"{len({item[0] for item in views.files(self.args.data, False)})} views of {self.args.data.name}",
         }
         torch.save(state, self.args.out / "last.tmp")
         (self.args.out / "last.tmp").replace(self.file())
@@ -149,7 +174,7 @@ class Run:
         """Validates, and appends a line to the curves."""
         line = {"step": self.step, "seconds": round(self.seconds), "loss": round(float(np.mean(self.losses or [0])), 5)}
         self.losses.clear()
-        line |= validate(self.average.module, self.args.data, self.args.methods, self.args.paths, self.device)
+        line |= self.validate()
         print(json.dumps(line), flush=True)
         with open(self.args.out / "log.jsonl", "a", encoding="utf-8") as log:
             log.write(json.dumps(line) + "\n")
@@ -166,7 +191,7 @@ class Run:
         for group in self.optimiser.param_groups:
             group["lr"] = rate + 1e-6
         batch = pool.batch(np.random.default_rng([args.seed, self.step]), args.batch, args.side, self.net.version)
-        loss = loss_of(self.net, [torch.from_numpy(x).to(self.device) for x in batch], args.squared)
+        loss = self.loss([torch.from_numpy(x).to(self.device) for x in batch])
         self.optimiser.zero_grad()
         loss.backward()
         # A step with a loss that is not finite would destroy the network.
@@ -178,12 +203,9 @@ class Run:
         self.step += 1
 
 
-def main():
-    args = arguments()
-    args.out.mkdir(parents=True, exist_ok=True)
-    if args.threads:
-        torch.set_num_threads(args.threads)
-    run, pool = Run(args), views.Pool(args.data, args.methods, args.paths, args.pairs)
+def train(run, pool):
+    """Trains until the end of the schedule or of the minutes of this call."""
+    args = run.args
     before = run.seconds
     start = saved = time.monotonic()
     between = min(VALIDATE_SECONDS, args.seconds / VALIDATIONS)
@@ -201,6 +223,19 @@ def main():
     run.save()
     if run.losses:
         run.report()
+
+
+def prepare(args):
+    """Makes the folder of a run, and sets its threads."""
+    args.out.mkdir(parents=True, exist_ok=True)
+    if args.threads:
+        torch.set_num_threads(args.threads)
+
+
+def main():
+    args = arguments()
+    prepare(args)
+    train(Run(args), views.Pool(args.data, args.methods, args.paths, args.pairs))
 
 
 if __name__ == "__main__":

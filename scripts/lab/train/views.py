@@ -13,11 +13,11 @@ from .data import PATHS, independent_file, manifest
 from .pairs import PAIRS
 
 # Arrays without a last axis of colour or direction; others have one.
-PLANAR = ("deviations", "deviation", "pair_deviations", "radius", "depth")
+PLANAR = ("deviations", "deviation", "pair_deviations", "radius", "depth", "effects", "correlation", "transmission")
 # Stacks of which a pool keeps the files open.
 OPEN = 128
 # Arrays without radiance, and the one whose last axis is a direction.
-DIMENSIONLESS = ("radius", "depth", "albedo", "normal", "iterations")
+DIMENSIONLESS = ("radius", "depth", "albedo", "normal", "iterations", "correlation", "transmission")
 # Standard deviation of the logarithm of the random factor on radiance: exposures of crops differ from their pictures'.
 EXPOSURE_SPREAD = 0.35
 
@@ -128,20 +128,30 @@ class Pool:
     """Random samples of all stacks; those that are finished later join within a minute."""
 
     def __init__(self, folder, methods, paths, pairs):
-        self.given, self.pairs = (folder, False, methods, paths, pairs), pairs
+        self.folder, self.methods, self.paths, self.pairs = folder, methods, paths, pairs
         self.known, self.looked = [], -math.inf
-        self.read = functools.lru_cache(OPEN)(read)
+        self.read = functools.lru_cache(OPEN)(self.open)
+
+    open = staticmethod(read)
+
+    def files(self):
+        """The stacks of the training views."""
+        return files(self.folder, False, self.methods, self.paths, self.pairs)
+
+    def sample(self, arrays, rng, side, version):
+        """The arrays of one random sample of a stack."""
+        part = random_part(arrays, rng, side)
+        stack = snapshot(arrays, rng.integers(len(arrays["iterations"])), self.pairs, part)
+        return sample(augment(stack, rng), self.pairs, version)
 
     def batch(self, rng, count, side, version):
         """Arrays of `count` random samples."""
         if time.monotonic() - self.looked > 60:
-            self.known, self.looked = files(*self.given), time.monotonic()
+            self.known, self.looked = self.files(), time.monotonic()
         if not self.known:
-            raise SystemExit(f"{self.given[0]}: no views to train with; render some with scripts/lab.sh training_data")
+            raise SystemExit(f"{self.folder}: no views to train with; render some with scripts/lab.sh training_data")
         chosen = []
         for _ in range(count):
             arrays = self.read(self.known[rng.integers(len(self.known))])
-            part = random_part(arrays, rng, side)
-            stack = snapshot(arrays, rng.integers(len(arrays["iterations"])), self.pairs, part)
-            chosen.append(sample(augment(stack, rng), self.pairs, version))
+            chosen.append(self.sample(arrays, rng, side, version))
         return [np.stack(part) for part in zip(*chosen)]

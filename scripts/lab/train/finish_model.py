@@ -1,0 +1,109 @@
+"""The network of the finish: for each pixel, weights that sum to one over the estimate, its denoised picture, and small
+kernels of both.
+
+The terms are 17 pixels of the estimate (3 x 3, and a ring of 8 at a distance of 2), 3 x 3 pixels of the denoised picture,
+and the denoised picture plus the mean of its difference from the estimate over 5 x 5 and 13 x 13 pixels, which returns
+light that the denoiser has moved.
+src/finish then limits the displacement from the estimate, so the result converges with it for any weights.
+"""
+
+import math
+
+import torch
+from torch import nn
+
+from .finish_views import PLANES
+from .model import conv, up
+
+# Offsets in y and x of the pixels of the kernels of the estimate and of the denoised picture.
+NEAR = [(y, x) for y in (-1, 0, 1) for x in (-1, 0, 1)]
+RING = [(y, x) for y in (-2, 0, 2) for x in (-2, 0, 2) if (y, x) != (0, 0)]
+OFFSETS = [NEAR + RING, NEAR]
+REACH = 2
+# Sides of the windows over which the difference of the pictures is averaged.
+MEANS = (5, 13)
+# Standard errors below this share of 1 + the estimate count as none.
+DEVIATION_FLOOR = 1e-3
+LOG_WEIGHT_BOUND = 12.0
+# Logarithm of the initial weight of the denoised picture, relative to the other terms.
+INITIAL = 5.0
+
+
+def split(x):
+    """The groups of input planes by name."""
+    return dict(zip(PLANES, torch.split(x, list(PLANES.values()), 1)))
+
+
+def normalised(groups):
+    """The planes that the convolutions read: radiance and errors on logarithmic scales."""
+    tone = lambda x: torch.log(1 + x)
+    floor = math.log(DEVIATION_FLOOR)
+    scale = 1 + groups["mean"].mean(1, keepdim=True)
+    noise = lambda x: (torch.log(x / scale + DEVIATION_FLOOR) - floor) / -floor
+    planes = [tone(groups["mean"]), tone(groups["denoised"]), noise(groups["deviation"]), noise(groups["reach"])]
+    planes += [groups["albedo"], groups["normal"], groups["depth"] / (groups["depth"] + 1), tone(groups["effects"])]
+    return torch.cat([*planes, groups["correlation"], groups["iterations"] / 8], 1)
+
+
+def terms(mean, denoised):
+    """The pictures [b, 3, h, w] that the weights combine, one after the other."""
+    height, width = mean.shape[-2:]
+    for picture, offsets in zip((mean, denoised), OFFSETS):
+        padded = nn.functional.pad(picture, [REACH] * 4, mode="replicate")
+        for y, x in offsets:
+            yield padded[..., REACH + y : REACH + y + height, REACH + x : REACH + x + width]
+    for side in MEANS:
+        pool = nn.AvgPool2d(side, 1, side // 2, count_include_pad=False)
+        yield (denoised + pool(mean - denoised)).clamp(min=0)
+
+
+TERMS = sum(map(len, OFFSETS)) + len(MEANS)
+
+
+class FinishNet(nn.Module):
+    """A U-Net at half and quarter resolution; 0.07 MFLOP per pixel. Its output is the combined picture."""
+
+    output = "picture"
+    stride = 4
+    # Receptive radius of the layers below (a test looks for seams), rounded up to the stride.
+    halo = 32
+
+    def __init__(self, half=48, quarter=64):
+        super().__init__()
+        self.half, self.quarter = half, quarter
+        self.stem, self.enc0 = conv(4 * sum(PLANES.values()), half), conv(half, half)
+        self.down = conv(half, quarter, stride=2)
+        self.middle = nn.ModuleList(conv(quarter, quarter) for _ in range(4))
+        # A 1x1 convolution commutes with nearest-neighbour enlargement, so it comes first.
+        self.up, self.dec0 = conv(quarter, half, 1), conv(half, half)
+        self.head = conv(half, 4 * TERMS, 1)
+        with torch.no_grad():
+            self.head.weight.mul_(0.1)
+            self.head.bias.zero_()
+            centre = len(OFFSETS[0]) + OFFSETS[1].index((0, 0))
+            self.head.bias.view(TERMS, 4)[centre] = INITIAL
+
+    def weights(self, groups):
+        """The positive weights of all terms [b, TERMS, h, w], which need not sum to one."""
+        half = torch.relu(self.stem(nn.functional.pixel_unshuffle(normalised(groups), 2)))
+        half = torch.relu(self.enc0(half))
+        x = torch.relu(self.down(half))
+        for first, second in zip(self.middle[::2], self.middle[1::2]):
+            x = torch.relu(x + second(torch.relu(first(x))))
+        x = torch.relu(self.dec0(torch.relu(half + up(self.up(x)))))
+        logarithms = nn.functional.pixel_shuffle(self.head(x), 2)
+        # A softmax over channels is slow in ONNX Runtime. Bounded logarithms keep the sums inside float32.
+        return torch.exp(logarithms.clamp(-LOG_WEIGHT_BOUND, LOG_WEIGHT_BOUND))
+
+    def forward(self, x):
+        groups = split(x)
+        weights, out = self.weights(groups), 0
+        for k, term in enumerate(terms(groups["mean"], groups["denoised"])):
+            out = out + weights[:, k : k + 1] * term
+        return out / weights.sum(1, keepdim=True)
+
+
+def bounded(groups, picture):
+    """The estimate after its displacement towards a picture, within its limit; never negative."""
+    mean, reach = groups["mean"], groups["reach"]
+    return (mean + (picture - mean).clamp(-reach, reach)).clamp(min=0)
