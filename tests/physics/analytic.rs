@@ -194,7 +194,7 @@ fn sun_through_a_slab_seen_directly_and_through_a_slab() {
         let expected = f64::from(rho * e) / std::f64::consts::PI * transmitted.powi(slabs) / between.powi(2);
         // Ignoring a slab would change the result by 8 %.
         let check = Check { expected, bias: 4e-3, detects: if through { 0.06 } else { 0.03 } };
-        check.run(TESTS, what, &by_photons(&scene, &settings(4, 100_000, 0.25), 16, 20)[4]);
+        check.run(TESTS, what, &by_photons(&scene, &settings(4, 100_000, 0.25), 8, 20)[4]);
     }
 }
 

@@ -43,7 +43,7 @@ fn is_white(what: &str, scene: &Scene, methods: &[Method]) {
     for &method in methods {
         let means: Vec<f64> = (1..=SEEDS)
             .map(|seed| {
-                let pixels = picture(scene, &camera, method, if method == Method::Sppm { 48 } else { 16 }, seed);
+                let pixels = picture(scene, &camera, method, if method == Method::Sppm { 48 } else { 8 }, seed);
                 pixels.iter().sum::<f64>() / pixels.len() as f64
             })
             .collect();
