@@ -48,7 +48,7 @@ class Maker(data.Maker):
     """Renders views of the training data of the finish."""
 
     # Estimates after 64 iterations have little noise, and targets should not have more.
-    target_seconds, held_out_seconds = 4.0, 10.0
+    target_seconds, held_out_seconds = 8.0, 12.0
 
     def noisy(self, view, note, scene, work):
         """Renders the noisy stacks of a view that are missing."""

@@ -2,8 +2,9 @@
 kernels of both.
 
 The terms are 17 pixels of the estimate (3 x 3, and a ring of 8 at a distance of 2), 3 x 3 pixels of the denoised picture,
-and the denoised picture plus the mean of its difference from the estimate over 5 x 5 and 13 x 13 pixels, which returns
-light that the denoiser has moved.
+its means over 5 x 5 and 13 x 13 pixels, which smooth blots, and the denoised picture plus such means of its difference
+from the estimate, which return light that the denoiser has moved. A rare bright sample says little about its pixel, so
+the terms limit the estimate to a multiple of the denoised picture.
 src/finish then limits the displacement from the estimate, so the result converges with it for any weights.
 """
 
@@ -20,13 +21,16 @@ NEAR = [(y, x) for y in (-1, 0, 1) for x in (-1, 0, 1)]
 RING = [(y, x) for y in (-2, 0, 2) for x in (-2, 0, 2) if (y, x) != (0, 0)]
 OFFSETS = [NEAR + RING, NEAR]
 REACH = 2
-# Sides of the windows over which the difference of the pictures is averaged.
-MEANS = (5, 13)
+# Sides and steps of the windows of means: 5 x 5 pixels, and of these means 3 x 3 in steps of 4, which makes 13 x 13.
+MEANS = ((5, 1), (3, 4))
 # Standard errors below this share of 1 + the estimate count as none.
 DEVIATION_FLOOR = 1e-3
-LOG_WEIGHT_BOUND = 12.0
-# Logarithm of the initial weight of the denoised picture, relative to the other terms.
-INITIAL = 5.0
+# Bound of the logarithms of weights, which the sums keep far from the limits of float32.
+LOG_WEIGHT_BOUND = 8.0
+# Logarithms of the initial weights of the denoised picture, and of the other terms.
+INITIAL, INITIAL_OTHERS = 3.0, -3.0
+# Factor of the denoised picture, and share of the mean of the picture, that limit the estimate.
+BRIGHTEST = (3.0, 0.1)
 
 
 def split(x):
@@ -47,17 +51,30 @@ def normalised(groups):
 
 def terms(mean, denoised):
     """The pictures [b, 3, h, w] that the weights combine, one after the other."""
+    mean = torch.minimum(mean, BRIGHTEST[0] * denoised + BRIGHTEST[1])
     height, width = mean.shape[-2:]
     for picture, offsets in zip((mean, denoised), OFFSETS):
         padded = nn.functional.pad(picture, [REACH] * 4, mode="replicate")
         for y, x in offsets:
             yield padded[..., REACH + y : REACH + y + height, REACH + x : REACH + x + width]
-    for side in MEANS:
-        pool = nn.AvgPool2d(side, 1, side // 2, count_include_pad=False)
-        yield (denoised + pool(mean - denoised)).clamp(min=0)
+    both = torch.cat([denoised, mean - denoised], 1)
+    for side, step in MEANS:
+        both = window_mean(both, side, step)
+        smooth, difference = both.split(3, 1)
+        yield smooth
+        yield (denoised + difference).clamp(min=0)
 
 
-TERMS = sum(map(len, OFFSETS)) + len(MEANS)
+def window_mean(x, side, step):
+    """The means of six planes over side x side pixels in steps of `step`; beyond the border, its pixels repeat."""
+    # The exporter needs a constant number of channels.
+    channels, reach = 6, side // 2 * step
+    kernel = torch.full((channels, 1, side, side), 1 / side**2, device=x.device)
+    padded = nn.functional.pad(x, [reach] * 4, mode="replicate")
+    return nn.functional.conv2d(padded, kernel, dilation=step, groups=channels)
+
+
+TERMS = sum(map(len, OFFSETS)) + 2 * len(MEANS)
 
 
 class FinishNet(nn.Module):
@@ -79,7 +96,7 @@ class FinishNet(nn.Module):
         self.head = conv(half, 4 * TERMS, 1)
         with torch.no_grad():
             self.head.weight.mul_(0.1)
-            self.head.bias.zero_()
+            self.head.bias.fill_(INITIAL_OTHERS)
             centre = len(OFFSETS[0]) + OFFSETS[1].index((0, 0))
             self.head.bias.view(TERMS, 4)[centre] = INITIAL
 
@@ -92,8 +109,8 @@ class FinishNet(nn.Module):
             x = torch.relu(x + second(torch.relu(first(x))))
         x = torch.relu(self.dec0(torch.relu(half + up(self.up(x)))))
         logarithms = nn.functional.pixel_shuffle(self.head(x), 2)
-        # A softmax over channels is slow in ONNX Runtime. Bounded logarithms keep the sums inside float32.
-        return torch.exp(logarithms.clamp(-LOG_WEIGHT_BOUND, LOG_WEIGHT_BOUND))
+        # A softmax over channels is slow in ONNX Runtime.
+        return torch.exp(LOG_WEIGHT_BOUND * torch.tanh(logarithms / LOG_WEIGHT_BOUND))
 
     def forward(self, x):
         groups = split(x)
