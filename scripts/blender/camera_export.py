@@ -25,14 +25,40 @@ def add_cameras(flat, warn):
         if thing.data.type == "PANO":  # Blender's exporter would leave it out
             thing.data = flat.remove_later(thing.data.copy())
             thing.data.type = "PERSP"
-            warn(flat.where(thing), "panoramic cameras are not carried: it is a perspective camera here; "
-                                    "choose Lens > Type > Perspective")
+            view = _panorama(thing.data, flat.scene.render)
+            if view is None:
+                warn(flat.where(thing), "of panoramic cameras only equirectangular ones and fisheyes are carried: it is a "
+                                        "perspective camera here; choose Lens > Panorama Type > Equirectangular")
+            else:
+                flat.add_extras(thing, panorama=view)
+                if thing.data.dof.use_dof:
+                    warn(flat.where(thing), "the depth of field of a panorama is not carried: all is sharp; switch Depth of "
+                                            "Field off to see the same in Cycles")
         keys = guard.attempt(warn, flat.where(thing), {}, "it has no lens, shift or other projection",
                              extras, thing, flat, warn)
         flat.add_extras(thing, **keys)
     if flat.scene.camera is not None:
         guard.attempt(warn, flat.where(flat.scene.camera), None, "clipped objects are not found",
                       warn_of_clipping, flat.scene.camera, flat, warn)
+
+
+def _panorama(camera, render):
+    """The key `panorama` of a panoramic camera, or None if its type is not carried."""
+    settings = camera if hasattr(camera, "panorama_type") else camera.cycles
+    if settings.panorama_type == "EQUIRECTANGULAR":
+        return {f"{name}_deg": [math.degrees(getattr(settings, f"{name}_{end}")) for end in ("min", "max")]
+                for name in ("longitude", "latitude")}
+    fov = settings.fisheye_fov
+    if settings.panorama_type == "FISHEYE_EQUIDISTANT":
+        # Cycles stretches the circle over the whole picture.
+        return {"fisheye": "equidistant", "fov_deg": math.degrees(fov), "half_size": [fov / 2, fov / 2]}
+    if settings.panorama_type != "FISHEYE_EQUISOLID":
+        return None
+    width, height = render.resolution_x * render.pixel_aspect_x, render.resolution_y * render.pixel_aspect_y
+    across = camera.sensor_fit == "HORIZONTAL" or camera.sensor_fit == "AUTO" and width >= height
+    length = camera.sensor_height if camera.sensor_fit == "VERTICAL" else camera.sensor_width
+    half = length / 2 / settings.fisheye_lens / (width if across else height)
+    return {"fisheye": "equisolid", "fov_deg": math.degrees(fov), "half_size": [half * width, half * height]}
 
 
 def extras(thing, flat, warn):

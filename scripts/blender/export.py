@@ -102,7 +102,8 @@ def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None, onl
         lighting.add_lamps(flat, warn)
         if sun is not None:
             environment = said["environment"]
-            sky.add_sun(sun, flat, ["camera"] if "visible" in environment else [], environment.get("light_group"))
+            hidden = ["camera"] if {"visible", "background"} & set(environment) else []
+            sky.add_sun(sun, flat, hidden, environment.get("light_group"))
         bodies = _solidity(flat.things)
         _warn_of_leaning_normals(flat, polished, warn)
         guard.attempt(warn, f'scene "{scene.name}"', None, "a camera within glass is not named",
@@ -112,7 +113,7 @@ def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None, onl
         _export_all_it_can(path, flat, warn)
     document, buffer = glb.read(path)
     bodies_of_nodes = [node.get("name") for node in document.get("nodes", [])]
-    linking.write(document, flat.links, bodies_of_nodes)
+    linking.write(document, flat.keys, bodies_of_nodes)
     _restore_names(document, flat.names)
     buffer = worn.finish(document, buffer, bodies)
     _warn_of_stretched_normals(document, warn)

@@ -188,7 +188,7 @@ def _area_mesh(thing, flat, picture=None):
     mesh.materials.append(material)
     # A mirrored transform keeps the front, because the lamp still emits along its local -Z.
     body = flat.add(name, mesh, thing.matrix_world.copy(), flat.hidden[thing.name], flat.groups[thing.name])
-    flat.links[body.name] = flat.links.get(thing.name)
+    flat.keys[body.name] = flat.keys.get(thing.name)
     flat.motion.pass_on(thing, body)
 
 

@@ -56,9 +56,9 @@ def _objects(collection):
         yield link.light_linking.link_state, thing
 
 
-def write(document, links, bodies):
-    """Add `links`, {name of an object of the flat scene: its keys}, to the nodes of a document. `bodies`: the name of each
+def write(document, keys, bodies):
+    """Add `keys`, {name of an object of the flat scene: its keys}, to the nodes of a document. `bodies`: the name of each
     node's object."""
     for node, name in zip(document.get("nodes", []), bodies, strict=True):
-        if links.get(name):
-            node.setdefault("extras", {}).setdefault("caustique", {}).update(links[name])
+        if keys.get(name):
+            node.setdefault("extras", {}).setdefault("caustique", {}).update(keys[name])

@@ -45,8 +45,8 @@ class FlatScene:
     """The evaluated scene until `undo` (a contextlib.ExitStack) closes.
 
     `things`: its objects. `names`: names of the original objects and meshes. `hidden`: for each of `things`, the kinds
-    of rays that do not hit it. `groups`: the light group of each, or None. `links`: light linking of each
-    (`linking.Links.of`). `lamp_factors`: for each measured lamp, the factors per channel of its nodes. `profiles`: the texts of IES profiles (bytes) that lamps name. `pictures`: PNGs
+    of rays that do not hit it. `groups`: the light group of each, or None. `keys`: for each, keys of
+    `extras.caustique` that a property of Blender cannot hold. `lamp_factors`: for each measured lamp, the factors per channel of its nodes. `profiles`: the texts of IES profiles (bytes) that lamps name. `pictures`: PNGs
     that spots throw. `volumes`: grids, material and name of volumes that become boxes. `stretched`: names of materials with normal maps that uneven scale stretches, found if the materials
     may be baked (`bakes`). `motion`: how the objects move while the shutter is open.
     """
@@ -57,7 +57,7 @@ class FlatScene:
         layer = bpy.context.view_layer
         layer.update()
         self.things, self.names, self.hidden, self.groups, self.lamp_factors = [], {}, {}, {}, {}
-        self.links, self._linking = {}, linking.Links()
+        self.keys, self._linking = {}, linking.Links()
         self.profiles, self.pictures, self.volumes = [], [], []
         self.stretched, self._bakes = set(), bakes
         self._warn, self._meshes, self._shapes, self._made, self._applied = warn, {}, [], [], {}
@@ -124,7 +124,7 @@ class FlatScene:
         return block
 
     def _take(self, instance, depsgraph):
-        """Object, data, world matrix, hidden rays, light group, light linking, properties and key (`motion.identity`) of an instance, or
+        """Object, data, world matrix, hidden rays, light group, keys, properties and key (`motion.identity`) of an instance, or
         None if it is invisible. The properties are its random number (0 to 1), and the attributes that materials read."""
         thing = instance.object
         if not (instance.is_instance or instance.show_self) or thing.type in _INVISIBLE or _is_pattern(instance):
@@ -157,8 +157,15 @@ class FlatScene:
         if (instance.parent or thing).name in self._indirect and "camera" not in hidden:
             hidden.append("camera")
         group = visibility.light_group(thing, parent, self._layer)
-        links = self._linking.of(thing.original, parent and parent.original)
-        return data and (thing.original, data, matrix, hidden, group, links, properties, key)
+        keys = self._keys(thing.original, parent and parent.original)
+        return data and (thing.original, data, matrix, hidden, group, keys, properties, key)
+
+    def _keys(self, thing, instancer):
+        """The keys of an object, and of the instancer that it comes from: light linking, and whether it is a holdout."""
+        keys = self._linking.of(thing, instancer)
+        if thing.type != "LIGHT" and (instancer or thing).holdout_get(view_layer=self._layer):
+            keys["holdout"] = True
+        return keys
 
     def _volume(self, instance, properties):
         """`_take` of a volume: a box with a medium."""
@@ -175,8 +182,8 @@ class FlatScene:
         parent, key = instance.parent if instance.is_instance else None, motion.identity(instance)
         hidden, group = visibility.hidden_rays(thing, parent), visibility.light_group(thing, parent, self._layer)
         matrix = instance.matrix_world @ volume.matrix
-        links = self._linking.of(thing.original, parent and parent.original)
-        return thing.original, mesh, matrix, hidden, group, links, properties, key
+        keys = self._keys(thing.original, parent and parent.original)
+        return thing.original, mesh, matrix, hidden, group, keys, properties, key
 
     def _mesh(self, instance, depsgraph):
         """The evaluated mesh of an instance, shared with equal instances; None without faces."""
@@ -211,7 +218,7 @@ class FlatScene:
         still = still and not (isinstance(data, bpy.types.Mesh) and motion.VELOCITY in data.attributes)
         return data if isinstance(data, bpy.types.Mesh) and not still else None
 
-    def _put(self, original, data, matrix, hidden, group, links, properties, key):
+    def _put(self, original, data, matrix, hidden, group, keys, properties, key):
         if not all(math.isfinite(x) for row in matrix for x in row):
             self._warn(f'object "{original.name}"', f"its place is not a number: {_OUT}; "
                                                     "check its constraints and drivers for divisions by zero")
@@ -226,7 +233,7 @@ class FlatScene:
         if isinstance(data, bpy.types.Camera):
             matrix = camera_export.without_scale(matrix)
         body = self.add(original.name, data, matrix, hidden, group)
-        self.links[body.name] = links
+        self.keys[body.name] = keys
         guard.attempt(self._warn, self.where(body), None, motion.STANDS_STILL,
                       self.motion.follow, key, body, matrix, at_frame, self)
         body.color, body.pass_index = original.color, original.pass_index
@@ -322,9 +329,6 @@ class FlatScene:
             if kind not in {"NONE", "OBJECT", "COLLECTION"}:
                 what = "hair" if kind == "PATH" else f"particles that render as {kind}"
                 self._warn(where, f'{what} of particle system "{system.name}" is not carried; convert it to a mesh')
-        if thing.type != "LIGHT" and thing.is_holdout:
-            self._warn(where, "it is a holdout, which is not carried: it is seen as any other object; "
-                              "mask it in the compositor by its cryptomatte")
         blockers = thing.light_linking.blocker_collection
         if blockers is not None:
             self._warn('light' + where[6:] if thing.type == "LIGHT" else where,

@@ -81,9 +81,10 @@ def unused_name(path, name):
     return name
 
 
-def bake_world(scene, path, width=1024):
-    """Render the world with a panoramic Cycles camera to an .exr beside the .glb. Returns the key `environment`."""
-    name = unused_name(path, os.path.splitext(os.path.basename(path))[0] + ".environment.exr")
+def bake_world(scene, path, width=1024, *, kind="environment"):
+    """Render the world with a panoramic Cycles camera to an .exr beside the .glb, with `kind` in its name. Returns the
+    key `environment`."""
+    name = unused_name(path, os.path.splitext(os.path.basename(path))[0] + f".{kind}.exr")
     file = os.path.join(os.path.dirname(path), name)
 
     def bake():

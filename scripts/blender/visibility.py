@@ -36,7 +36,7 @@ def as_rendered(scene, undo, warn):
     take(scene.render, _SIMPLIFY)
     for collection in bpy.data.collections:
         put(collection, "hide_viewport", collection.hide_render)
-    _show_layers(layer.layer_collection, put, warn)
+    _show_layers(layer.layer_collection, put)
     for thing in bpy.data.objects:
         # The scene's camera works even if it is hidden.
         put(thing, "hide_viewport", thing.hide_render and thing.type != "CAMERA")
@@ -88,13 +88,10 @@ def _layer(scene, warn):
     return layer
 
 
-def _show_layers(branch, put, warn):
+def _show_layers(branch, put):
     for child in branch.children:
         put(child, "hide_viewport", False)  # the outliner's eye: renders ignore it
-        if child.holdout and not child.exclude:
-            warn(f'collection "{child.name}"', "it is a holdout, which is not carried: its objects are seen; "
-                                               "mask them in the compositor by their cryptomatte")
-        _show_layers(child, put, warn)
+        _show_layers(child, put)
 
 
 def _warn_of_viewport_nodes(thing, modifier, warn):

@@ -43,21 +43,52 @@ def _world(scene, path, black, warn):
     shader = source(output.inputs["Surface"])
     if shader is None:
         return said, None
-    said["environment"], disc = _background(shader, path), None
-    if said["environment"] is None:
-        with contextlib.ExitStack() as undo:
-            disc = sky.sun(scene, undo, where, warn)
-            said["environment"] = sky.bake_world(scene, path)
-        warn(where, f"its nodes are baked to {said['environment']['file']}; "
-                    "keep that file beside the scene's file")
-        if any(n.type == "LIGHT_PATH" and any(s.is_linked for s in n.outputs) for n in output.id_data.nodes):
-            warn(where, "it has a Light Path node, and is baked as cameras see it: so it lights the scene, too; "
-                        "render over a transparent film, and compose the background")
+    by_ray = [s for node in output.id_data.nodes if node.type == "LIGHT_PATH" for s in node.outputs if s.is_linked]
+    background = _surroundings(scene, output, path, "background", lambda: None, warn)[0] if by_ray else None
+    with contextlib.ExitStack() as undo:
+        for socket in by_ray:
+            _cut(socket, undo)
+        said["environment"], disc = _surroundings(
+            scene, output, path, "environment", lambda: sky.sun(scene, undo, where, warn), warn)
+    if background is not None:
+        said["environment"]["background"] = background
+    others = [socket.name for socket in by_ray if socket.name != "Is Camera Ray"]
+    if others:
+        warn(where, f"it depends on {', '.join(others)} of its Light Path node: all rays but those of the camera see it as "
+                    "where these are 0; use Is Camera Ray alone to see the same in Cycles")
     _add_visibility(world, said["environment"], where, warn)
     group = visibility.light_group(world, None, bpy.context.view_layer)
     if group:
         said["environment"]["light_group"] = group
     return said, disc
+
+
+def _surroundings(scene, output, path, name, find_sun, warn):
+    """The key `environment` of the world's surface, and what `find_sun` returns if the world is baked, to an image with
+    `name` in its file name."""
+    shader = source(output.inputs["Surface"])
+    while shader is not None and shader.type == "MIX_SHADER" and constant(shader.inputs[0]) in {0.0, 1.0}:
+        shader = source(shader.inputs[1 + int(constant(shader.inputs[0]))])
+    if shader is None:
+        return {"color": [0.0, 0.0, 0.0]}, None
+    said, found = _background(shader, path), None
+    if said is None:
+        found = find_sun()
+        said = sky.bake_world(scene, path, kind=name)
+        warn(f'world "{scene.world.name}"', f"its nodes are baked to {said['file']}; keep that file beside the scene's file")
+    return said, found
+
+
+def _cut(socket, undo):
+    """Make the links of an output carry 0 until `undo` closes."""
+    tree = socket.id_data
+    for link in list(socket.links):
+        to = link.to_socket
+        before = to.default_value if to.type == "VALUE" else tuple(to.default_value)
+        undo.callback(tree.links.new, socket, to)
+        undo.callback(setattr, to, "default_value", before)
+        tree.links.remove(link)
+        to.default_value = 0 if to.type == "VALUE" else [0.0] * len(before)
 
 
 def _add_visibility(world, environment, where, warn):

@@ -1,4 +1,5 @@
-//! Perspective and orthographic cameras with a thin lens: sampling of rays, and importance towards a point.
+//! Perspective and orthographic cameras with a thin lens, and panoramas: sampling of rays, and importance
+//! towards a point.
 
 mod filter;
 mod tiles;
@@ -9,13 +10,95 @@ pub use tiles::{GROUP_SIZE, TilePixel, par_pixels, pixels_per_band};
 use crate::math::{DMat3, DMat4, DVec2, DVec3, DVec4, Mat3, Vec2, Vec3, warp};
 use std::f32::consts::PI;
 
-/// Perspective or orthographic projection, with the size of the film.
+/// Projection of a camera, with the size of the film.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Projection {
     /// Perspective projection: half width and half height of the film in a plane at distance 1 from the camera.
     Perspective(Vec2),
     /// Orthographic projection: half width and half height of the film (m).
     Orthographic(Vec2),
+    /// Equirectangular projection: half the range of longitudes and of latitudes (radians). The film plane has longitudes
+    /// to the right of the axis and latitudes above it. There is no lens.
+    Equirectangular(Vec2),
+    /// A circular picture of the directions around the axis. There is no lens.
+    Fisheye(Fisheye),
+}
+
+/// A fisheye projection. The distance of a point of the film plane from the axis depends on the angle to the axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fisheye {
+    /// Half width and half height of the film.
+    pub half: Vec2,
+    /// The largest angle to the axis that is seen (radians).
+    pub edge: f32,
+    /// Whether the distance is 2 sin(angle / 2), so that equal solid angles have equal areas on the film; otherwise it is
+    /// the angle.
+    pub equal_area: bool,
+}
+
+/// Smallest sine in densities of panoramas, which are infinite at the poles.
+const MIN_SINE: f32 = 1e-6;
+
+impl Projection {
+    /// Half the size of the film, in the unit of the projection.
+    fn half(self) -> Vec2 {
+        match self {
+            Projection::Perspective(half) | Projection::Orthographic(half) | Projection::Equirectangular(half) => half,
+            Projection::Fisheye(fisheye) => fisheye.half,
+        }
+    }
+
+    /// Whether the film is curved, so that points of the film plane stand for directions.
+    #[inline]
+    fn is_panorama(self) -> bool {
+        matches!(self, Projection::Equirectangular(_) | Projection::Fisheye(_))
+    }
+
+    /// The unit direction in camera space that a point of a panorama's film plane stands for; `None` outside of the circle
+    /// of a fisheye.
+    #[inline]
+    fn direction(self, at: Vec2) -> Option<Vec3> {
+        let Projection::Fisheye(Fisheye { edge, equal_area, .. }) = self else {
+            let ((sin, cos), (up, level)) = (at.x.sin_cos(), at.y.sin_cos());
+            return Some(Vec3::new(level * sin, up, -level * cos));
+        };
+        let radius = at.length();
+        let angle = if equal_area { 2.0 * (0.5 * radius).min(1.0).asin() } else { radius };
+        let around = at.normalize_or_zero() * angle.sin();
+        (angle <= edge && !(equal_area && radius > 2.0)).then(|| around.extend(-angle.cos()))
+    }
+
+    /// The point of a panorama's film plane that stands for a unit direction in camera space; `None` if a fisheye does not
+    /// see it. Longitudes are within half a turn of `middle`.
+    #[inline]
+    fn place(self, direction: Vec3, middle: f32) -> Option<Vec2> {
+        let Projection::Fisheye(Fisheye { edge, equal_area, .. }) = self else {
+            let longitude = direction.x.atan2(-direction.z) - middle;
+            let turned = longitude - 2.0 * PI * (longitude / (2.0 * PI)).round();
+            return Some(Vec2::new(middle + turned, direction.y.clamp(-1.0, 1.0).asin()));
+        };
+        let across = direction.truncate();
+        let angle = across.length().atan2(-direction.z);
+        let radius = if equal_area { 2.0 * (0.5 * angle).sin() } else { angle };
+        (angle <= edge).then(|| across.normalize_or_zero() * radius)
+    }
+
+    /// Density per solid angle of a panorama's rays at a unit direction in camera space. Points are uniform on the film.
+    #[inline]
+    fn panorama_pdf_w(self, direction: Vec3) -> f32 {
+        let half = self.half();
+        // Solid angle over area of the film plane.
+        let spread = match self {
+            Projection::Fisheye(Fisheye { equal_area: true, .. }) => 1.0,
+            Projection::Fisheye(_) => {
+                let sine = direction.truncate().length();
+                let angle = sine.atan2(-direction.z);
+                if angle > MIN_SINE { sine.max(MIN_SINE) / angle } else { 1.0 }
+            }
+            _ => (1.0 - direction.y * direction.y).max(0.0).sqrt().max(MIN_SINE),
+        };
+        1.0 / (4.0 * half.x * half.y * spread)
+    }
 }
 
 /// The whole picture, of which the film may be a crop window.
@@ -66,6 +149,8 @@ pub struct CameraRay {
     pub origin: Vec3,
     /// Unit direction.
     pub direction: Vec3,
+    /// Whether light arrives along the ray: the film point is not outside of the circle of a fisheye.
+    pub seen: bool,
 }
 
 /// A connection from a point of the scene to the lens, for a light path's contribution.
@@ -105,8 +190,12 @@ impl Camera {
 
     /// A copy of this camera with the film moved by `shift`, in widths to the right and heights upwards.
     pub fn with_shift(&self, shift: Vec2) -> Camera {
-        let (Projection::Perspective(half) | Projection::Orthographic(half)) = self.projection;
-        Camera { offset: 2.0 * shift * half, ..*self }
+        Camera { offset: 2.0 * shift * self.projection.half(), ..*self }
+    }
+
+    /// A copy of this camera whose film is centred at a point of the film plane, in the unit of the projection.
+    pub fn with_centre(&self, offset: Vec2) -> Camera {
+        Camera { offset, ..*self }
     }
 
     /// A copy of this camera with another pixel filter.
@@ -216,11 +305,11 @@ impl Camera {
     /// Corners of a rectangle that contains the origins of all camera rays.
     pub fn origins(&self) -> [Vec3; 4] {
         let (film, centre) = match self.projection {
-            Projection::Perspective(_) => (Vec2::ZERO, Vec2::ZERO),
             Projection::Orthographic(half) => {
                 let size = Vec2::new(self.width as f32, self.height as f32);
                 (half * size / self.whole.film, self.plane(self.whole.corner + 0.5 * size, half))
             }
+            _ => (Vec2::ZERO, Vec2::ZERO),
         };
         let half = film + if self.has_lens() { self.lens_radius } else { 0.0 };
         [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)]
@@ -234,7 +323,7 @@ impl Camera {
 
     /// Whether the lens has a radius, so that the picture has depth of field.
     pub fn has_lens(&self) -> bool {
-        self.lens_radius > 0.0
+        self.lens_radius > 0.0 && !self.projection.is_panorama()
     }
 
     /// Converts a point of the whole picture (pixels, y down) to a point of the film plane (y up) in the unit of the
@@ -249,11 +338,17 @@ impl Camera {
     /// samples the lens.
     #[inline]
     pub fn ray(&self, film: Vec2, lens: Vec2) -> CameraRay {
+        let mut seen = true;
         let (mut origin, focus) = match self.projection {
             Projection::Perspective(half) => (Vec3::ZERO, self.plane(film, half).extend(-1.0) * self.focus_distance),
             Projection::Orthographic(half) => {
                 let p = self.plane(film, half);
                 (p.extend(0.0), p.extend(-self.focus_distance))
+            }
+            panorama => {
+                let direction = panorama.direction(self.plane(film, panorama.half()));
+                seen = direction.is_some();
+                (Vec3::ZERO, direction.unwrap_or(Vec3::NEG_Z))
             }
         };
         if self.has_lens() {
@@ -262,47 +357,51 @@ impl Camera {
         CameraRay {
             origin: self.position + self.rotation * origin,
             direction: (self.rotation * (focus - origin)).normalize(),
+            seen,
         }
     }
 
     /// The matrices `worldToCamera` (x to the right, y up, z along the view) and `worldToNDC` (x to the right, y down,
     /// from 0 to 1 after division by w) of OpenEXR: row-major, for row vectors. `origin` is the world position of this
-    /// scene's origin.
-    pub fn matrices(&self, origin: DVec3) -> [[f32; 16]; 2] {
+    /// scene's origin. A panorama has no matrix to NDC.
+    pub fn matrices(&self, origin: DVec3) -> ([f32; 16], Option<[f32; 16]>) {
         let rotation = self.rotation.as_dmat3();
         let axes = DMat3::from_cols(rotation.x_axis, rotation.y_axis, -rotation.z_axis).transpose();
         let position = self.position.as_dvec3() + origin;
         let to_camera = DMat4::from_mat3(axes) * DMat4::from_translation(-position);
-        let (Projection::Perspective(half) | Projection::Orthographic(half)) = self.projection;
-        let (half, offset) = (half.as_dvec2(), self.offset.as_dvec2());
+        let (half, offset) = (self.projection.half().as_dvec2(), self.offset.as_dvec2());
         // A point at distance 1 along the view has the NDC x coordinate (1 + (x - offset) / half) / 2.
         let (sx, sy) = (0.5 / half.x, -0.5 / half.y);
         let (ox, oy) = (0.5 - offset.x * sx, 0.5 - offset.y * sy);
         let film = match self.projection {
-            Projection::Perspective(_) => DMat4::from_cols(
+            Projection::Equirectangular(_) | Projection::Fisheye(_) => None,
+            Projection::Perspective(_) => Some(DMat4::from_cols(
                 DVec4::new(sx, 0.0, 0.0, 0.0),
                 DVec4::new(0.0, sy, 0.0, 0.0),
                 DVec4::new(ox, oy, 0.0, 1.0),
                 DVec4::new(0.0, 0.0, 1.0, 0.0),
-            ),
-            Projection::Orthographic(_) => DMat4::from_cols(
+            )),
+            Projection::Orthographic(_) => Some(DMat4::from_cols(
                 DVec4::new(sx, 0.0, 0.0, 0.0),
                 DVec4::new(0.0, sy, 0.0, 0.0),
                 DVec4::new(0.0, 0.0, 1.0, 0.0),
                 DVec4::new(ox, oy, 0.0, 1.0),
-            ),
+            )),
         };
         // Row vectors need the transposed matrix. Its rows are the columns, which `to_cols_array` returns.
-        [to_camera, film * to_camera].map(|m| m.to_cols_array().map(|x| x as f32))
+        let rows = |m: DMat4| m.to_cols_array().map(|x| x as f32);
+        (rows(to_camera), film.map(|film| rows(film * to_camera)))
     }
 
     /// Width of the view of the whole picture (m) as a linear function of distance: its slope, which is 0 for an
-    /// orthographic camera, and its value at distance 0, which is 0 for a perspective camera. The slope is at most pi,
-    /// because a wide film still sees less than half a circle.
+    /// orthographic camera, and its value at distance 0, which is 0 for a perspective camera. The slope is the angle of the view: at
+    /// most pi of a perspective camera, because a wide film still sees less than half a circle.
     pub fn span(&self) -> (f32, f32) {
         match self.projection {
             Projection::Perspective(half) => ((2.0 * half.x).min(PI), 0.0),
             Projection::Orthographic(half) => (0.0, 2.0 * half.x),
+            Projection::Equirectangular(half) => (2.0 * half.x, 0.0),
+            Projection::Fisheye(Fisheye { edge, .. }) => (2.0 * edge, 0.0),
         }
     }
 
@@ -311,8 +410,11 @@ impl Camera {
         self.whole.film.x
     }
 
-    /// Depth (m) of the point `p` along the viewing direction, from the camera.
+    /// Depth (m) of the point `p` along the viewing direction, from the camera; the distance to the camera of a panorama.
     pub fn depth(&self, p: Vec3) -> f32 {
+        if self.projection.is_panorama() {
+            return p.distance(self.position);
+        }
         (p - self.position).dot(self.forward())
     }
 
@@ -321,6 +423,11 @@ impl Camera {
     pub fn project(&self, p: DVec3) -> Option<DVec2> {
         let local = self.rotation.as_dmat3().transpose() * (p - self.position.as_dvec3());
         let (half, distance) = match self.projection {
+            Projection::Equirectangular(half) | Projection::Fisheye(Fisheye { half, .. }) => {
+                let at = self.projection.place(local.normalize_or_zero().as_vec3(), self.offset.x)?;
+                let plane = ((at - self.offset) / half).as_dvec2();
+                return Some(DVec2::new(1.0 + plane.x, 1.0 - plane.y) * 0.5);
+            }
             Projection::Perspective(half) => (half, -local.z),
             Projection::Orthographic(half) => (half, 1.0),
         };
@@ -341,9 +448,9 @@ impl Camera {
             lens_local = (warp::disc_concentric(lens) * self.lens_radius).extend(0.0);
         }
         let (half, lens_world, to, at) = match self.projection {
-            Projection::Perspective(half) => {
+            Projection::Perspective(_) | Projection::Equirectangular(_) | Projection::Fisheye(_) => {
                 let lens_world = self.position + self.rotation * lens_local;
-                (half, lens_world, p - lens_world, Vec2::ZERO)
+                (self.projection.half(), lens_world, p - lens_world, Vec2::ZERO)
             }
             Projection::Orthographic(half) => {
                 let local = self.rotation.transpose() * (p - self.position);
@@ -358,10 +465,13 @@ impl Camera {
         let wi = -to.try_normalize()?;
         let local = self.rotation.transpose() * -wi;
         let cos = -local.z;
-        if cos <= 0.0 {
+        if cos <= 0.0 && !self.projection.is_panorama() {
             return None;
         }
         let (on_film, importance) = match self.projection {
+            Projection::Equirectangular(_) | Projection::Fisheye(_) => {
+                (self.projection.place(local, self.offset.x)?, self.projection.panorama_pdf_w(local) / distance2)
+            }
             Projection::Perspective(_) => {
                 // The intersection with the focus plane, scaled to a film point at distance 1.
                 let focus = lens_local + local * (self.focus_distance / cos);
@@ -389,6 +499,9 @@ impl Camera {
     pub fn pdf_w(&self, direction: Vec3) -> f32 {
         let cos = direction.dot(self.forward());
         match self.projection {
+            Projection::Equirectangular(_) | Projection::Fisheye(_) => {
+                self.projection.panorama_pdf_w(self.rotation.transpose() * direction)
+            }
             _ if cos <= 0.0 => 0.0,
             Projection::Perspective(half) => 1.0 / (4.0 * half.x * half.y * cos * cos * cos),
             Projection::Orthographic(half) => 1.0 / (4.0 * half.x * half.y * cos),
@@ -412,8 +525,20 @@ mod tests {
     fn rays_and_connections_are_inverse() {
         let half = Vec2::new(0.8, 0.45);
         let lenses = [(0.0, Vec2::ZERO), (0.3, Vec2::ZERO), (0.3, Vec2::new(0.7, -0.2))];
-        let all = [Projection::Perspective(half), Projection::Orthographic(half)];
+        let wide = Vec2::new(2.9, 1.5);
+        let fisheye = |equal_area| Projection::Fisheye(Fisheye { half: Vec2::new(1.1, 0.9), edge: 3.0, equal_area });
+        let all = [
+            Projection::Perspective(half),
+            Projection::Orthographic(half),
+            Projection::Equirectangular(wide),
+            fisheye(false),
+            fisheye(true),
+        ];
         for (projection, (lens_radius, shift)) in all.into_iter().flat_map(|p| lenses.map(|lens| (p, lens))) {
+            // Panoramas have no shift.
+            if projection.is_panorama() && shift != Vec2::ZERO {
+                continue;
+            }
             let rotation = Mat3::from_rotation_y(0.4) * Mat3::from_rotation_x(-0.2);
             let camera = Camera::new(DVec3::new(1.0, 2.0, 3.0), rotation, projection, (lens_radius, 4.0), (160, 90));
             let camera = camera.with_shift(shift);
@@ -422,6 +547,9 @@ mod tests {
                 let film = draws.two(Purpose::Pixel) * Vec2::new(160.0, 90.0);
                 let lens = draws.two(Purpose::Lens);
                 let ray = camera.ray(film, lens);
+                if !ray.seen {
+                    continue;
+                }
                 let p = ray.origin + ray.direction * (0.5 + 9.0 * draws.one(Purpose::Lobe));
                 let sample = camera.sample(p, lens).unwrap();
                 assert!((sample.film - film).length() < 2e-2, "{film} {}", sample.film);
@@ -490,7 +618,8 @@ mod tests {
         {
             let camera = some(projection).without_lens();
             let origin = DVec3::new(100.0, -20.0, 5.0);
-            let [to_camera, to_ndc] = camera.matrices(origin);
+            let (to_camera, to_ndc) = camera.matrices(origin);
+            let to_ndc = to_ndc.expect("a flat picture has a matrix");
             let by = |m: &[f32; 16], p: DVec3| {
                 let p = [p.x, p.y, p.z, 1.0];
                 let column = |c: usize| (0..4).map(|row| p[row] * f64::from(m[4 * row + c])).sum::<f64>();

@@ -118,6 +118,8 @@ pub struct Instance {
     pub hidden_from_camera: bool,
     /// Whether the picture shows only the shadows of other objects on the instance, as alpha, and their light.
     pub shadow_catcher: bool,
+    /// Whether cameras see black without coverage where they see the instance. Other rays hit it.
+    pub holdout: bool,
     /// Lights whose light the instance receives and blocks.
     pub links: ObjectLinks,
     /// Whether the place or the shape of the instance depends on the time while the shutter is open.
@@ -160,6 +162,12 @@ impl Placement {
 }
 
 impl Instance {
+    /// Whether cameras do not see the light that the surface of the instance scatters.
+    #[inline]
+    pub fn is_unseen(&self) -> bool {
+        self.hidden_from_camera || self.holdout
+    }
+
     /// Transforms a point of the mesh to world space.
     #[inline]
     pub fn point(&self, p: Vec3) -> Vec3 {

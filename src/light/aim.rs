@@ -299,7 +299,8 @@ mod tests {
         let choice = Cdf::new(areas.iter().map(|&a| f64::from(a)));
         let area = areas.iter().sum();
         let targets = CausticTargets { instances: Vec::new(), spheres, choice, area };
-        let sky = Sky { center: Vec3::ZERO, radius: 1.05, environment: None, hidden_from_camera: false };
+        let sky =
+            Sky { center: Vec3::ZERO, radius: 1.05, environment: None, background: None, hidden_from_camera: false };
         let d = Vec3::NEG_Y;
         let whole = PI * sky.radius * sky.radius;
         let n = 200_000u64;
@@ -359,7 +360,13 @@ mod tests {
             let spheres = vec![(Vec3::new(0.3, -0.2, 0.5) * ratio, 1.0)];
             let choice = Cdf::new(std::iter::once(f64::from(area)));
             let targets = CausticTargets { instances: Vec::new(), spheres, choice, area };
-            let sky = Sky { center: Vec3::ZERO, radius: ratio, environment: None, hidden_from_camera: false };
+            let sky = Sky {
+                center: Vec3::ZERO,
+                radius: ratio,
+                environment: None,
+                background: None,
+                hidden_from_camera: false,
+            };
             let whole = PI * ratio * ratio;
             let region = Region::new(Vec3::new(-0.4, 0.2, 0.1) * ratio, 1.0, ratio);
             let (mut mean, mut greatest) = (0.0f64, 0.0f32);

@@ -39,7 +39,7 @@ impl SceneFacts {
         let whole = scene.whole_camera(request)?;
         let (width, height) = whole.size();
         let [x, y, ..] = scene.window(request, (width, height))?.unwrap_or_default();
-        let [world_to_camera, world_to_ndc] = whole.matrices(scene.origin);
+        let (world_to_camera, world_to_ndc) = whole.matrices(scene.origin);
         Ok(SceneFacts {
             shape: layer_shape(settings, scene),
             names: SceneNames::of(scene),

@@ -148,17 +148,21 @@ fn set_environment(description: &mut Description, request: &SceneRequest) -> Res
         };
         description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
         description.environment_hidden_from_camera = false;
+        description.background = None;
         description.environment_unknown = false;
     } else {
         light_preset::apply(description, request.light_preset);
     }
     set_rotation_and_strength(description, request)?;
-    let Some(environment) = &description.environment else { return Ok(()) };
-    let brightest = match &environment.source {
-        EnvironmentSource::Color(color) => color.max_element(),
-        EnvironmentSource::Image { texels, .. } => texels.as_flattened().iter().copied().fold(0.0, f32::max),
+    let brightness = |environment: &EnvironmentDescription| {
+        environment.strength
+            * match &environment.source {
+                EnvironmentSource::Color(color) => color.max_element(),
+                EnvironmentSource::Image { texels, .. } => texels.as_flattened().iter().copied().fold(0.0, f32::max),
+            }
     };
-    if brightest * environment.strength <= MAX_RADIANCE {
+    let all = [&description.environment, &description.background];
+    if all.into_iter().flatten().all(|environment| brightness(environment) <= MAX_RADIANCE) {
         return Ok(());
     }
     let cause = format!("its environment is brighter than {MAX_RADIANCE:e} W/(sr m^2)");
@@ -174,11 +178,13 @@ fn set_rotation_and_strength(description: &mut Description, request: &SceneReque
             Error::new(ErrorKind::Usage, request.path.display(), format!("{option}: the scene has no environment"));
         return Err(error.hint("give one with --env"));
     };
-    if let Some(degrees) = request.rotation {
-        environment.rotation_deg = degrees as f32;
-    }
-    if let Some(strength) = request.strength {
-        environment.strength = strength as f32;
+    for environment in [environment].into_iter().chain(&mut description.background) {
+        if let Some(degrees) = request.rotation {
+            environment.rotation_deg = degrees as f32;
+        }
+        if let Some(strength) = request.strength {
+            environment.strength = strength as f32;
+        }
     }
     Ok(())
 }

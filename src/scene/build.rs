@@ -57,12 +57,17 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     // The picture is laid over a photograph.
     description.picture.film_transparent |= catchers.is_some();
 
+    // Cameras may see black instead of the environment.
+    let background =
+        description.background.map(|seen| environment(Some(seen)).unwrap_or(Environment::Uniform(Rgb::ZERO)));
+    let lighting = environment(description.environment);
     let sky = Sky {
         center: (center - origin).as_vec3(),
         // Slightly larger, so that no light path from infinity starts inside the geometry.
         radius: radius as f32 * 1.001,
         hidden_from_camera: description.environment_hidden_from_camera || description.picture.film_transparent,
-        environment: environment(description.environment),
+        environment: if background.is_some() { lighting.or(Some(Environment::Uniform(Rgb::ZERO))) } else { lighting },
+        background,
     };
     let others = description.lights.iter().filter(|light| !light.is_sphere());
     let mut distributions = Distributions::default();
@@ -342,6 +347,7 @@ fn place_instances(description: &mut Description, origin: DVec3) -> Shapes {
             object: placed.object,
             hidden_from_camera: placed.hidden_from_camera,
             shadow_catcher: placed.shadow_catcher,
+            holdout: placed.holdout,
             links: ObjectLinks::ALL,
             moves: placed.moves,
             to_world: shared.then(|| placement(&to_world)),
@@ -547,6 +553,7 @@ pub(super) fn add_light_spheres(description: &mut Description) {
             object: description.objects.len() as u32,
             hidden_from_camera: light.hidden_from_camera,
             shadow_catcher: false,
+            holdout: false,
             light_group: light.light_group.clone(),
             links: light.links.clone(),
             moves: blurred,

@@ -2,7 +2,7 @@
 
 use super::Scene;
 use super::description::{CameraDescription, Projection};
-use crate::camera::{self, Camera, Filter};
+use crate::camera::{self, Camera, Filter, Fisheye};
 use crate::error::{Error, ErrorKind, Result};
 use crate::geometry::Instance;
 use crate::math::{DAffine3, DMat3, DVec3, Mat3, Vec2, Vec3, bounding_box};
@@ -182,6 +182,13 @@ impl Scene {
                 let ymag = ymag.abs().max(xmag.abs() / film_aspect);
                 camera::Projection::Orthographic(Vec2::new(ymag * film_aspect, ymag))
             }
+            Projection::Equirectangular { longitude, latitude } => {
+                let half = Vec2::new(longitude[1] - longitude[0], latitude[1] - latitude[0]) * 0.5;
+                camera::Projection::Equirectangular(half)
+            }
+            Projection::Fisheye { fov, equal_area, half_size } => {
+                camera::Projection::Fisheye(Fisheye { half: half_size.into(), edge: 0.5 * fov, equal_area })
+            }
         };
         let lens = if described.aperture_radius > 0.0 && described.focus_distance > 0.0 {
             (described.aperture_radius, described.focus_distance)
@@ -190,7 +197,14 @@ impl Scene {
         };
         let position = described.to_world.translation - self.origin;
         let camera = Camera::new(position, rotation(&described.to_world), projection, lens, (width, height));
-        Ok(camera.with_shift(described.shift.into()).with_filter(request.filter))
+        let camera = match described.projection {
+            Projection::Equirectangular { longitude, latitude } => {
+                camera.with_centre(Vec2::new(longitude[0] + longitude[1], latitude[0] + latitude[1]) * 0.5)
+            }
+            Projection::Fisheye { .. } => camera,
+            _ => camera.with_shift(described.shift.into()),
+        };
+        Ok(camera.with_filter(request.filter))
     }
 
     /// The camera of the request: its own, a view of the whole scene, the one of a name among `cameras`, or the first of
@@ -228,6 +242,10 @@ impl Scene {
             (Some([width, height]), _) => width as f32 / height as f32,
             (None, Projection::Perspective { aspect, .. }) => aspect.unwrap_or(DEFAULT_ASPECT),
             (None, Projection::Orthographic { xmag, ymag }) => (xmag / ymag).abs(),
+            (None, Projection::Equirectangular { longitude, latitude }) => {
+                (longitude[1] - longitude[0]) / (latitude[1] - latitude[0])
+            }
+            (None, Projection::Fisheye { half_size, .. }) => half_size[0] / half_size[1],
         };
         let scaled = |x: u32, factor: f32| ((x as f32 * factor).round() as u32).max(1);
         let (width, height) = match (request.width, request.height) {

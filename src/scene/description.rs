@@ -41,6 +41,8 @@ pub struct Description {
     pub environment: Option<EnvironmentDescription>,
     /// Whether camera rays do not see the environment; it lights the scene anyway.
     pub environment_hidden_from_camera: bool,
+    /// What cameras see instead of `environment`; `None` if they see it.
+    pub background: Option<EnvironmentDescription>,
     /// Name of the environment's light group (a named set of lights with a layer of its own), if it has one.
     pub environment_light_group: Option<String>,
     /// Whether the original scene may have an environment that the file lacks: the exporter that wrote the file never
@@ -137,6 +139,8 @@ pub struct PlacedMesh {
     pub hidden_from_camera: bool,
     /// Whether the picture shows only the shadows of other objects on the instance, as alpha, and their light.
     pub shadow_catcher: bool,
+    /// Whether cameras see black without coverage where they see the instance.
+    pub holdout: bool,
     /// Name of the light group (a named set of lights with a layer of its own) of the instance, if it is emissive.
     pub light_group: Option<String>,
     /// Collections of the instance, and those that receive and block its light; `None` if there are none.
@@ -277,6 +281,23 @@ pub enum Projection {
         xmag: f32,
         /// Half the height of the view (m).
         ymag: f32,
+    },
+    /// Equirectangular projection: all directions between two longitudes, to the right of the camera's axis, and between
+    /// two latitudes, above it (radians).
+    Equirectangular {
+        /// Longitudes of the left and right edge, in ascending order.
+        longitude: [f32; 2],
+        /// Latitudes of the lower and upper edge, in ascending order.
+        latitude: [f32; 2],
+    },
+    /// Fisheye projection: all directions within an angle to the camera's axis.
+    Fisheye {
+        /// Angle of the whole view (radians).
+        fov: f32,
+        /// Whether the distance of a point of the picture from the centre is 2 sin(angle / 2); otherwise it is the angle.
+        equal_area: bool,
+        /// Half the width and half the height of the picture, in the unit of that distance.
+        half_size: [f32; 2],
     },
 }
 

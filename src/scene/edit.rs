@@ -191,6 +191,7 @@ mod tests {
                 object: index,
                 hidden_from_camera: false,
                 shadow_catcher: false,
+                holdout: false,
                 light_group: None,
                 links: None,
                 moves: false,

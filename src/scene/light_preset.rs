@@ -54,6 +54,7 @@ pub fn apply(description: &mut Description, chosen: Option<LightPreset>) {
     }
     description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
     description.environment_hidden_from_camera = false;
+    description.background = None;
     description.environment_light_group = None;
     description.environment_unknown = false;
 }
@@ -114,6 +115,7 @@ fn add_floor(description: &mut Description) {
             object,
             hidden_from_camera: false,
             shadow_catcher: false,
+            holdout: false,
             light_group: None,
             links: None,
             moves: false,

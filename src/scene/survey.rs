@@ -41,6 +41,8 @@ pub struct Survey {
     pub infinite_lights: bool,
     /// Whether some instance is a shadow catcher.
     pub catchers: bool,
+    /// Whether some instance is a holdout.
+    pub holdouts: bool,
     /// Whether the scene has an environment that cameras see.
     pub environment: bool,
 }
@@ -68,6 +70,7 @@ impl Survey {
             survey.hidden_from_camera |= instance.hidden_from_camera;
             survey.hidden_solids |= instance.hidden_from_camera && objects.material(instance).is_solid();
             survey.catchers |= instance.shadow_catcher;
+            survey.holdouts |= instance.holdout;
         }
         let (mut solids, mut perfect, mut sharp) = (0, false, false);
         for (material, &uses) in objects.materials.list.iter().zip(&uses) {

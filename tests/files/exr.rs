@@ -240,7 +240,7 @@ fn windows_cameras_and_colours_are_in_the_header() {
     let path = folder.path().join("a.exr");
     let set = fixture(3, 2);
     let world_to_camera = std::array::from_fn(|i| i as f32);
-    let world_to_ndc = std::array::from_fn(|i| -(i as f32));
+    let world_to_ndc = Some(std::array::from_fn(|i| -(i as f32)));
     let frame = exr::Frame { display: [8, 5], corner: [4, 1], world_to_camera, world_to_ndc };
     let attributes = Attributes { frame: Some(frame), ..Attributes::default() };
     for naming in [Naming::Plain, Naming::Blender] {

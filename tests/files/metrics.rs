@@ -383,7 +383,7 @@ fn windows_have_the_errors_of_whole_pictures() {
     let write = |name: &str, picture: &Picture, whole: [u32; 2], corner: [u32; 2]| {
         let mut set = LayerSet::new(WIDTH, HEIGHT);
         set.push(Layer::interleaved("", "RGB", picture.iter().copied())).expect("it fits");
-        let frame = Frame { display: whole, corner, world_to_camera: [0.0; 16], world_to_ndc: [0.0; 16] };
+        let frame = Frame { display: whole, corner, world_to_camera: [0.0; 16], world_to_ndc: Some([0.0; 16]) };
         let path = folder.path().join(name);
         let attributes = Attributes { frame: Some(frame), ..Attributes::default() };
         exr::write(&path, &set, &attributes, exr::Options::default()).expect("it can be written");

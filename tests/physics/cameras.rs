@@ -21,8 +21,8 @@ fn rendered(scene: &Scene, view: &CameraRequest, (method, iterations): (Method, 
     render(scene, &camera, &settings, |_, _| Control::Continue)
 }
 
-/// A floor, a mirror that lights it and a lamp, seen at an angle by an orthographic camera.
-fn in_parallel(aperture_radius: f32) -> Scene {
+/// A floor, a mirror that lights it and a lamp, seen at an angle.
+fn at_an_angle(projection: Projection, aperture_radius: f32) -> Scene {
     let mut description = Description::default();
     add(&mut description, "floor", quad(Vec3::new(-1.5, 0.0, 1.5), 3.0 * Vec3::X, -3.0 * Vec3::Z), matte(0.7, 0.0));
     let upright = quad(Vec3::new(-1.0, 0.0, -1.0), 2.0 * Vec3::X, 1.2 * Vec3::Y);
@@ -31,24 +31,33 @@ fn in_parallel(aperture_radius: f32) -> Scene {
     let lamp = quad(Vec3::new(-0.4, 1.6, -0.2), 0.8 * Vec3::X, 0.8 * Vec3::Z);
     add(&mut description, "lamp", lamp, matte(0.0, 4.0));
     let mut camera = look_at(DVec3::new(1.0, 2.5, 3.0), DVec3::new(0.0, 0.2, 0.0), 40.0);
-    camera.projection = Projection::Orthographic { xmag: 1.2, ymag: 1.2 };
+    camera.projection = projection;
     (camera.aperture_radius, camera.focus_distance) = (aperture_radius, 4.0);
     description.cameras.push(camera);
     build(description)
 }
 
-/// Light paths connected to an orthographic camera, with and without a lens, agree with paths from the camera, and
+/// Light paths connected to an orthographic camera, with and without a lens, and to a panorama agree with paths from the camera, and
 /// weights sum to one.
 #[test]
-fn light_paths_connect_to_orthographic_cameras() {
-    for aperture_radius in [0.0, 0.3] {
-        let scene = in_parallel(aperture_radius);
+fn light_paths_connect_to_all_projections() {
+    let parallel = Projection::Orthographic { xmag: 1.2, ymag: 1.2 };
+    let panorama = Projection::Equirectangular { longitude: [-1.0, 0.7], latitude: [-0.9, 0.6] };
+    let fisheye = Projection::Fisheye { fov: 2.0, equal_area: false, half_size: [0.8, 0.8] };
+    for (projection, aperture_radius) in [(parallel, 0.0), (parallel, 0.3), (panorama, 0.0), (fisheye, 0.0)] {
+        let scene = at_an_angle(projection, aperture_radius);
         let by = |method, iterations, count| {
             seeds(method, count, |seed| rendered(&scene, &square(SIZE), (method, iterations), seed))
         };
         let reference = by(Method::Path, 64, 8);
         for method in [Method::Bdpt, Method::Vcm, Method::Mlt] {
-            agree(&format!("{method:?}, lens {aperture_radius}"), &by(method, 16, 8), &reference, 0.01, 0.3);
+            agree(
+                &format!("{method:?}, {projection:?}, lens {aperture_radius}"),
+                &by(method, 16, 8),
+                &reference,
+                0.01,
+                0.3,
+            );
         }
     }
 }

@@ -38,6 +38,7 @@ mod open_space;
 mod photon_mapping;
 mod profiles;
 mod progressive;
+mod seen;
 mod shadow_rays;
 mod smoke;
 mod splitting;

@@ -170,14 +170,29 @@ class Geometry(cycles_comparison.CyclesComparison):
         self.look(5)
         self.silhouettes_agree(self.caustique(16), self.cycles(16))
 
+    def test_holdouts(self):
+        """Objects, and those of collections and instancers, are black without coverage where the camera sees them."""
+        for x, name in ((0, "seen"), (1, "out"), (2, "of a collection")):
+            self.put(name, x, 0, (1, 1, 1))
+        bpy.data.objects["out"].is_holdout = True
+        apart = self.collection("apart")
+        self.scene.collection.children.link(apart)
+        apart.objects.link(bpy.data.objects["of a collection"])
+        bpy.context.view_layer.layer_collection.children["apart"].holdout = True
+        self.look(4)
+        self.assertEqual(export.write(self.path), [])
+        said = {node["name"]: node.get("extras", {}).get("caustique", {}).get("holdout", False)
+                for node in glb.read(self.path)[0]["nodes"] if "mesh" in node}
+        self.assertEqual(said, {"seen": False, "out": True, "of a collection": True})
+        self.silhouettes_agree(self.caustique(16), self.cycles(16))
+
     def test_losses_are_named(self):
-        """Hair, holdouts, shadow linking, and nodes that act only in the viewport."""
+        """Hair, shadow linking, and nodes that act only in the viewport."""
         hair = bpy.data.hair_curves.new("hair")
         hair.add_curves([4])
         self.put("hair", 0, 0, None, hair)
         linked = self.put("linked", 1, 0, (1, 0, 0))
         linked.light_linking.blocker_collection = self.collection("receivers")
-        self.put("out", 2, 0, (1, 0, 0)).is_holdout = True
         nodes = self.put("nodes", 3, 0, (0, 0, 0))
         self.instance_on_points(nodes, None, glow("made by nodes", (1, 1, 0)))
         nodes.modifiers[0].node_group.nodes.new("GeometryNodeIsViewport")
@@ -185,9 +200,9 @@ class Geometry(cycles_comparison.CyclesComparison):
         gone.hide_render = True
         self.look(6)
         warnings = export.write(self.path)
-        self.assertEqual(len(warnings), 4, warnings)
+        self.assertEqual(len(warnings), 3, warnings)
         for what, said in zip(('"hair": hair curves are', '"linked": its shadow linking', '"nodes": its modifier "nodes" has an '
-                               'Is Viewport node', '"out": it is a holdout'), sorted(warnings)):
+                               'Is Viewport node'), sorted(warnings)):
             self.assertIn("object " + what, said)
 
     def test_nothing_is_left_behind(self):

@@ -397,7 +397,27 @@ class Lamps(cycles_comparison.CyclesComparison):
         for socket, end in ((paths.outputs["Is Camera Ray"], mix.inputs[0]), (background(world).outputs[0], mix.inputs[2]),
                             (mix.outputs[0], output.inputs["Surface"])):
             world.node_tree.links.new(socket, end)
-        self.assertIn("Light Path node", "\n".join(export.write(self.path)))
+        export.write(self.path)
+        document, _ = glb.read(self.path)
+        said = document["scenes"][0]["extras"]["caustique"]["environment"]
+        self.assertEqual((said["color"], said["background"]), ([0, 0, 0], {"color": [1, 0.5, float(numpy.float32(0.2))]}))
+        world.node_tree.links.new(paths.outputs["Is Glossy Ray"], mix.inputs[0])
+        self.assertIn("depends on Is Glossy Ray", "\n".join(export.write(self.path)))
+
+    def test_a_world_that_cameras_see_otherwise(self):
+        """The world lights the floor by one colour; cameras see another one, and mirrors the first."""
+        self.floor(1.0)
+        world = self.world((1, 0.5, 0.2, 1))
+        tree = world.node_tree
+        paths, mix, other = (tree.nodes.new("ShaderNode" + kind) for kind in ("LightPath", "MixShader", "Background"))
+        other.inputs["Color"].default_value = (0, 0.2, 1, 1)
+        output = next(n for n in tree.nodes if n.type == "OUTPUT_WORLD")
+        for socket, end in ((paths.outputs["Is Camera Ray"], mix.inputs[0]), (background(world).outputs[0], mix.inputs[1]),
+                            (other.outputs[0], mix.inputs[2]), (mix.outputs[0], output.inputs["Surface"])):
+            tree.links.new(socket, end)
+        eye((0, -6, 1), (0, 0, 1), lens=30)
+        self.alike(self.caustique(), self.cycles())
+        self.assertEqual(self.warnings, [])
 
     def test_losses_of_lamps_are_named(self):
         self.floor()

@@ -227,12 +227,21 @@ class Agrees(cycles_comparison.CyclesComparison):
         self.silhouettes_agree(self.caustique(16), self.cycles(16))
         self.assertEqual(self.warnings, [])
 
-    def test_panoramas_become_perspective_cameras(self):
+    def test_panoramas(self):
+        """Equirectangular cameras and fisheyes see what they see in Cycles; others become perspective cameras."""
         self.floor(1.0)
-        eye((0, -1, 1), (0, 0, 0), type="PANO")
-        self.assertIn("panoramic cameras", "".join(export.write(self.path)))
+        lamp("POINT", (0.2, 0.1, 1), 20, shadow_soft_size=0.0)
+        camera = eye((0.1, -0.4, 0.5), (0, 0, 0.4), type="PANO").data
+        settings = camera if hasattr(camera, "panorama_type") else camera.cycles
+        for kind in ("EQUIRECTANGULAR", "FISHEYE_EQUIDISTANT", "FISHEYE_EQUISOLID"):
+            settings.panorama_type = kind
+            with self.subTest(kind):
+                self.silhouettes_agree(self.caustique(16), self.cycles(16))
+                self.assertEqual(self.warnings, [])
+        settings.panorama_type = "MIRRORBALL"
+        self.assertIn("of panoramic cameras only", "".join(export.write(self.path)))
         self.assertEqual(glb.read(self.path)[0]["cameras"][0]["type"], "perspective")
-        self.assertEqual(self.scene.camera.data.type, "PANO")
+        self.assertEqual(camera.type, "PANO")
 
 
 class Named(cycles_comparison.CyclesComparison):

@@ -53,6 +53,7 @@ pub fn add_at(description: &mut Description, name: &str, mesh: Mesh, material: M
         object: description.objects.len() as u32,
         hidden_from_camera: false,
         shadow_catcher: false,
+        holdout: false,
         light_group: None,
         links: None,
         moves: false,

@@ -73,8 +73,8 @@ pub struct Frame {
     pub corner: [u32; 2],
     /// World to camera: x to the right, y up, z along the view.
     pub world_to_camera: [f32; 16],
-    /// World to the display window: x to the right and y down, both from 0 to 1.
-    pub world_to_ndc: [f32; 16],
+    /// World to the display window: x to the right and y down, both from 0 to 1; `None` for a panorama.
+    pub world_to_ndc: Option<[f32; 16]>,
 }
 
 impl Attributes {

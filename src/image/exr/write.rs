@@ -249,7 +249,7 @@ fn header(set: &LayerSet, part: &Part<'_>, attributes: &Attributes, options: Opt
         header.shared_attributes.display_window = IntegerBounds::from_dimensions(Vec2(width as usize, height as usize));
         own.layer_position = Vec2(x as i32, y as i32);
         own.world_to_camera = Some(options.naming.from_file_axes(world_to_camera));
-        own.world_to_normalized_device = Some(options.naming.from_file_axes(world_to_ndc));
+        own.world_to_normalized_device = world_to_ndc.map(|matrix| options.naming.from_file_axes(matrix));
     }
     own.frames_per_second = attributes.moment.rate.map(|[frames, seconds]| (frames as i32, seconds));
     header.shared_attributes.time_code =

@@ -87,6 +87,11 @@ impl Light for EnvironmentLight {
     #[inline]
     fn arriving(&self, sky: &Sky, at: &Receiver, d: Vec3, camera: bool) -> Option<Arrival> {
         let environment = sky.environment.as_ref().filter(|_| !(camera && sky.hidden_from_camera))?;
+        if let Some(background) = sky.background.as_ref().filter(|_| camera) {
+            // No other technique finds the light that a camera sees directly.
+            let (radiance, _) = background.radiance_and_pdf_w(d);
+            return Some(Arrival { radiance, direct: 1.0, start: 1.0 });
+        }
         let (radiance, start) = environment.radiance_and_pdf_w(d);
         Some(Arrival { radiance, direct: environment.pdf_w_at(at.n, d, start), start })
     }

@@ -70,6 +70,8 @@ impl Frustum {
         let to_camera = DAffine3 { matrix3, ..camera.to_world }.inverse();
         let [x, y] = [DVec3::X, DVec3::Y];
         let sides = match camera.projection {
+            // A panorama sees all sides.
+            Projection::Equirectangular { .. } | Projection::Fisheye { .. } => [(DVec3::ZERO, 0.0); 4],
             Projection::Perspective { yfov, aspect } => {
                 let up = (0.5 * f64::from(yfov)).tan();
                 let right = up * resolved.or(aspect.map(f64::from)).unwrap_or(DEFAULT_ASPECT);

@@ -64,7 +64,7 @@ impl Default for Visible {
     }
 }
 
-/// Content of `extras.caustique.environment`: a colour or an image file.
+/// Content of `extras.caustique.environment`, and of its `background`: a colour or an image file.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct EnvironmentExtras {
@@ -74,6 +74,8 @@ pub(super) struct EnvironmentExtras {
     pub(super) strength: Option<f32>,
     pub(super) visible: Visible,
     pub(super) light_group: Option<String>,
+    /// What cameras see instead.
+    pub(super) background: Option<Box<EnvironmentExtras>>,
 }
 
 /// Units of the intensities of punctual lights, as the file states them.
@@ -173,6 +175,7 @@ pub(super) struct ObjectExtras {
     pub(super) visible: Visible,
     pub(super) light_group: Option<String>,
     pub(super) shadow_catcher: bool,
+    pub(super) holdout: bool,
 }
 
 /// Light linking and shadow linking in `extras.caustique` of a node with a mesh or a light.
@@ -191,6 +194,42 @@ pub(super) struct CameraExtras {
     pub(super) aperture_radius: Option<f32>,
     pub(super) focus_distance: Option<f32>,
     pub(super) shift: Option<[f32; 2]>,
+    pub(super) panorama: Option<PanoramaExtras>,
+}
+
+/// Content of `extras.caustique.panorama`.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(default)]
+pub(super) struct PanoramaExtras {
+    /// Ranges of an equirectangular picture (degrees).
+    pub(super) longitude_deg: [f32; 2],
+    pub(super) latitude_deg: [f32; 2],
+    /// The kind of fisheye, if it is one.
+    pub(super) fisheye: Option<FisheyeKind>,
+    pub(super) fov_deg: f32,
+    pub(super) half_size: Option<[f32; 2]>,
+}
+
+/// How the distance from the centre of a fisheye's picture depends on the angle to the axis.
+#[derive(Clone, Copy, PartialEq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum FisheyeKind {
+    /// It is the angle.
+    Equidistant,
+    /// It is 2 sin(angle / 2).
+    Equisolid,
+}
+
+impl Default for PanoramaExtras {
+    fn default() -> Self {
+        PanoramaExtras {
+            longitude_deg: [-180.0, 180.0],
+            latitude_deg: [-90.0, 90.0],
+            fisheye: None,
+            fov_deg: 180.0,
+            half_size: None,
+        }
+    }
 }
 
 /// Content of `extras.caustique` of a light's node, or of the light.
@@ -261,6 +300,11 @@ pub(super) const SCENE: &[&str] = &[
     "environment.visible",
     "environment.visible.camera",
     "environment.light_group",
+    "environment.background",
+    "environment.background.color",
+    "environment.background.file",
+    "environment.background.rotation_deg",
+    "environment.background.strength",
     "medium",
     "medium.sigma_a",
     "medium.sigma_s",
@@ -301,7 +345,17 @@ pub(super) const MATERIAL: &[&str] = &[
     "coat_color_texture",
     "sheen_model",
 ];
-pub(super) const CAMERA: &[&str] = &["aperture_radius", "focus_distance", "shift"];
+pub(super) const CAMERA: &[&str] = &[
+    "aperture_radius",
+    "focus_distance",
+    "shift",
+    "panorama",
+    "panorama.longitude_deg",
+    "panorama.latitude_deg",
+    "panorama.fisheye",
+    "panorama.fov_deg",
+    "panorama.half_size",
+];
 pub(super) const LIGHT: &[&str] = &[
     "radius",
     "angle_deg",
@@ -326,6 +380,12 @@ pub(super) const NODE: &[&str] = &[
     "aperture_radius",
     "focus_distance",
     "shift",
+    "panorama",
+    "panorama.longitude_deg",
+    "panorama.latitude_deg",
+    "panorama.fisheye",
+    "panorama.fov_deg",
+    "panorama.half_size",
     "radius",
     "angle_deg",
     "blend",
@@ -333,6 +393,7 @@ pub(super) const NODE: &[&str] = &[
     "visible.camera",
     "light_group",
     "shadow_catcher",
+    "holdout",
     "collections",
     "receivers",
     "receivers.include",

@@ -2,7 +2,7 @@
 
 use super::clipping::Clip;
 use super::document::{Document, get, named};
-use super::extras::{self, CameraExtras, LightExtras, Units};
+use super::extras::{self, CameraExtras, FisheyeKind, LightExtras, PanoramaExtras, Units};
 use super::profiles::Profiles;
 use super::texture::Textures;
 use super::{LightUnits, fault};
@@ -285,6 +285,32 @@ fn cone(spot: &Spot, blend: Option<f32>, place: &str, warnings: &mut Vec<String>
     }
 }
 
+/// The projection of a panorama. The error is the cause.
+fn panorama(extras: &PanoramaExtras) -> std::result::Result<Projection, &'static str> {
+    let PanoramaExtras { longitude_deg, latitude_deg, fisheye, fov_deg, half_size } = *extras;
+    let Some(kind) = fisheye else {
+        let within =
+            |[low, high]: [f32; 2], most: f32| low < high && -most <= low && high <= most && high - low <= 360.0;
+        if !(within(longitude_deg, 360.0) && within(latitude_deg, 90.0)) {
+            return Err(
+                "extras.caustique.panorama must have ascending longitudes over at most 360 degrees, and ascending latitudes from -90 to 90",
+            );
+        }
+        let radians = |range: [f32; 2]| range.map(f32::to_radians);
+        return Ok(Projection::Equirectangular { longitude: radians(longitude_deg), latitude: radians(latitude_deg) });
+    };
+    if !(fov_deg > 0.0 && fov_deg <= 360.0) {
+        return Err("extras.caustique.panorama.fov_deg must be above 0 and at most 360");
+    }
+    let (fov, equal_area) = (fov_deg.to_radians(), kind == FisheyeKind::Equisolid);
+    let whole = if equal_area { 2.0 * (0.25 * fov).sin() } else { 0.5 * fov };
+    let half_size = half_size.unwrap_or([whole; 2]);
+    if !half_size.iter().all(|side| side.is_finite() && *side > 0.0) {
+        return Err("extras.caustique.panorama.half_size must be finite and positive");
+    }
+    Ok(Projection::Fisheye { fov, equal_area, half_size })
+}
+
 /// Reads the camera of a node, which is given by its name and raw JSON.
 pub(super) fn camera(
     document: &Document,
@@ -319,6 +345,10 @@ pub(super) fn camera(
     extras::check_keys(raw, extras::CAMERA, &place, warnings);
     let (on_camera, on_node): (CameraExtras, CameraExtras) =
         (extras::read(raw, &place)?, extras::read(node.1, &place)?);
+    let projection = match on_node.panorama.or(on_camera.panorama) {
+        None => projection,
+        Some(extras) => panorama(&extras).map_err(|cause| fault(&place, cause))?,
+    };
     let aperture_radius = on_node.aperture_radius.or(on_camera.aperture_radius).unwrap_or(0.0);
     let focus_distance = on_node.focus_distance.or(on_camera.focus_distance);
     if !(aperture_radius.is_finite() && aperture_radius >= 0.0) {

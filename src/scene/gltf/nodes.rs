@@ -4,7 +4,7 @@ use super::animation::{MovingParts, Tracks};
 use super::clipping::{self, Clip};
 use super::deform::Deformation;
 use super::document::{Document, extension, get, named};
-use super::extras::{self, LinkExtras, ObjectExtras, Rate, SceneExtras};
+use super::extras::{self, EnvironmentExtras, LinkExtras, ObjectExtras, Rate, SceneExtras};
 use super::files;
 use super::flat::flatten;
 use super::materials::{Library, tangent_coordinates};
@@ -364,43 +364,27 @@ impl<'r> Reader<'r> {
         (0..nodes.len()).filter(|i| !child[*i]).collect()
     }
 
+    /// Reads the environment, and what cameras see instead of it.
     fn environment(&mut self, place: &str) -> Result<()> {
         let Some(extras) = &self.scene.environment else {
             self.out.environment_unknown = self.document.is_by_blender();
             return Ok(());
         };
-        let strength = extras.strength.unwrap_or(1.0);
-        if !(strength.is_finite() && strength >= 0.0 && extras.rotation_deg.is_finite()) {
-            return Err(fault("environment", "strength and rotation_deg must be finite, strength not negative"));
+        let folder = self.document.folder;
+        if let Some(background) = &extras.background {
+            self.out.background =
+                surroundings(folder, "environment.background", background, place, &mut self.out.warnings)?;
         }
-        let source = match (&extras.color, &extras.file) {
-            (Some(color), None) => {
-                let color = Rgb::from_array(*color);
-                if !(color.is_finite() && color.min_element() >= 0.0) {
-                    return Err(fault("environment", "its color must be finite and not negative"));
-                }
-                // A black environment is none.
-                if color == Rgb::ZERO {
-                    self.out.environment_is_black = true;
-                    return Ok(());
-                }
-                EnvironmentSource::Color(color)
-            }
-            (None, Some(file)) => {
-                let file = uri::require_path(file).and_then(|file| self.document.folder.file(file.as_ref()));
-                let file = file.map_err(|e| e.within("environment"))?;
-                environment_file::read(&file, &mut self.out.warnings)?
-            }
-            _ => {
-                self.out
-                    .warnings
-                    .push(format!("{place}: the environment has not one of color and file and is ignored"));
-                return Ok(());
-            }
-        };
+        let found = surroundings(folder, "environment", extras, place, &mut self.out.warnings)?;
+        let Some(environment) = found else { return Ok(()) };
+        // A black environment is none.
+        if matches!(environment.source, EnvironmentSource::Color(Rgb::ZERO)) {
+            self.out.environment_is_black = true;
+            return Ok(());
+        }
         self.out.environment_hidden_from_camera = !extras.visible.camera;
         self.out.environment_light_group.clone_from(&extras.light_group);
-        self.out.environment = Some(EnvironmentDescription { source, rotation_deg: extras.rotation_deg, strength });
+        self.out.environment = Some(environment);
         Ok(())
     }
 
@@ -547,7 +531,7 @@ impl<'r> Reader<'r> {
                 };
                 let (name, light_group) = (name.clone(), extras.light_group.clone());
                 let hidden_from_camera = !extras.visible.camera;
-                let shadow_catcher = extras.shadow_catcher;
+                let (shadow_catcher, holdout) = (extras.shadow_catcher, extras.holdout);
                 self.out.instances.push(PlacedMesh {
                     name,
                     mesh,
@@ -555,6 +539,7 @@ impl<'r> Reader<'r> {
                     object,
                     hidden_from_camera,
                     shadow_catcher,
+                    holdout,
                     light_group,
                     links: links.clone(),
                     moves,
@@ -746,6 +731,39 @@ impl<'r> Reader<'r> {
         memory::require(bytes, format_args!("{placed} placed meshes"))
             .map_err(|e| e.hint("place fewer copies, join them into one mesh, or render with more memory"))
     }
+}
+
+/// Reads the colour or the image of the key `key`; `None`, with a warning, if it has neither or both.
+fn surroundings(
+    folder: Folder,
+    key: &str,
+    extras: &EnvironmentExtras,
+    place: &str,
+    warnings: &mut Vec<String>,
+) -> Result<Option<EnvironmentDescription>> {
+    let strength = extras.strength.unwrap_or(1.0);
+    if !(strength.is_finite() && strength >= 0.0 && extras.rotation_deg.is_finite()) {
+        return Err(fault(key, "strength and rotation_deg must be finite, strength not negative"));
+    }
+    let source = match (&extras.color, &extras.file) {
+        (Some(color), None) => {
+            let color = Rgb::from_array(*color);
+            if !(color.is_finite() && color.min_element() >= 0.0) {
+                return Err(fault(key, "its color must be finite and not negative"));
+            }
+            EnvironmentSource::Color(color)
+        }
+        (None, Some(file)) => {
+            let file = uri::require_path(file).and_then(|file| folder.file(file.as_ref()));
+            let file = file.map_err(|e| e.within(key))?;
+            environment_file::read(&file, warnings)?
+        }
+        _ => {
+            warnings.push(format!("{place}: the {key} has not one of color and file and is ignored"));
+            return Ok(None);
+        }
+    };
+    Ok(Some(EnvironmentDescription { source, rotation_deg: extras.rotation_deg, strength }))
 }
 
 /// Topology of a closed surface, where its volume and holes do not matter.

@@ -255,7 +255,7 @@ impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
             }
             if techniques.camera
                 && self.shared.connects_camera()
-                && !camera_paths.scene.shapes.instances[vertex.surface.instance as usize].hidden_from_camera
+                && !camera_paths.scene.shapes.instances[vertex.surface.instance as usize].is_unseen()
             {
                 self.connect_camera(vertex);
             }

@@ -109,7 +109,7 @@ impl CameraPaths<'_> {
         PathStart {
             origin: ray.origin,
             direction: ray.direction,
-            throughput: Rgb::splat(seen),
+            throughput: Rgb::splat(if ray.seen { seen } else { 0.0 }),
             interior,
             leaving: None,
             first: PrecomputedHit::Unknown,

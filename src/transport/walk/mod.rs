@@ -217,6 +217,14 @@ impl<'a> Path<'a> {
             if self.scene.survey.hidden_solids && self.depth == 1 && self.transport == Transport::Radiance {
                 self.enter_hidden_solids(&end);
             }
+            if self.scene.survey.holdouts
+                && self.depth == 1
+                && self.transport == Transport::Radiance
+                && let End::Surface(arrival) = &end
+                && self.scene.shapes.instances[arrival.surface.instance as usize].holdout
+            {
+                return;
+            }
             if self.depth == 1 && self.linked.is_some_and(|light| !receives(self.scene, &end, light)) {
                 return;
             }

@@ -1,0 +1,70 @@
+//! What cameras alone see: holdouts, and a background instead of the environment, by all methods.
+
+use crate::support;
+
+use caustique::math::{DVec3, Rgb, Vec3};
+use caustique::render::{Control, Levels, Method, Rendered, Settings, render};
+use caustique::scene::Description;
+use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
+use support::scenes::{add, build, look_at, matte, mirror, quad, sphere, square};
+
+const SIZE: u32 = 12;
+
+/// A white floor and a mirror behind it under a white sky. The camera, which looks over the floor at the mirror, sees a
+/// blue sky. A ball hangs before the mirror.
+fn outdoors(holdout: bool) -> Description {
+    let uniform = |color| {
+        let source = EnvironmentSource::Color(color);
+        Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 })
+    };
+    let (environment, background) = (uniform(Rgb::ONE), uniform(Rgb::new(0.0, 0.0, 3.0)));
+    let mut description = Description { environment, background, ..Description::default() };
+    add(&mut description, "floor", quad(Vec3::new(-4.0, 0.0, 2.0), Vec3::X * 8.0, Vec3::Z * -4.0), matte(0.5, 0.0));
+    add(&mut description, "mirror", quad(Vec3::new(-1.0, 0.2, -2.0), Vec3::X * 2.0, Vec3::Y * 1.0), mirror());
+    add(&mut description, "ball", sphere(Vec3::new(0.0, 0.7, -0.5), 0.25, 24), matte(0.5, 0.0));
+    description.instances.last_mut().expect("the instance was added").holdout = holdout;
+    description.cameras.push(look_at(DVec3::new(0.0, 0.9, 3.0), DVec3::new(0.0, 0.8, 0.0), 50.0));
+    description
+}
+
+fn picture(description: Description, method: Method) -> Rendered {
+    let scene = build(description);
+    let camera = scene.camera(&square(SIZE)).expect("a camera");
+    let settings = Settings { method, levels: Levels::new(1), iterations: Some(16), ..Settings::default() };
+    render(&scene, &camera, &settings, |_, _| Control::Continue)
+}
+
+#[test]
+fn cameras_see_the_background_and_mirrors_the_environment_by_all_methods() {
+    // Rows from the top: the sky, then the mirror, which reflects the sky above the camera.
+    let [sky, mirrored] = [(1, 1), (6, 5)].map(|(x, y)| y * SIZE as usize + x);
+    for method in Method::ALL.iter().copied().filter(|&method| method != Method::Light) {
+        let mut open = outdoors(false);
+        open.instances.pop();
+        let pixels = picture(open, method).pixels;
+        assert_eq!(pixels[sky].mean(0), DVec3::new(0.0, 0.0, 3.0), "{method:?}");
+        let reflected = pixels[mirrored].mean(0);
+        assert!(reflected.x > 0.0 && (reflected.z - reflected.x).abs() < 1e-3 * reflected.x, "{method:?}: {reflected}");
+        let floor: DVec3 = pixels[(SIZE * SIZE - SIZE) as usize..].iter().map(|pixel| pixel.mean(0)).sum();
+        assert!((floor.z / floor.x - 1.0).abs() < 1e-3 && floor.x > 0.0, "the background lights the floor: {method:?}");
+    }
+}
+
+/// A holdout is black without coverage where the camera sees it, and mirrors and other surfaces see it as any other
+/// object.
+#[test]
+fn holdouts_are_black_and_light_others_by_all_methods() {
+    let middle = (6 * SIZE + 6) as usize;
+    for &method in Method::ALL {
+        let [plain, holdout] = [false, true].map(|holdout| picture(outdoors(holdout), method).pixels);
+        let ball = [&plain, &holdout].map(|pixels| pixels[middle].mean(0));
+        assert!((ball[0].x > 0.0 || method == Method::Light) && ball[1] == DVec3::ZERO, "{method:?}: {ball:?}");
+        let covered = [&plain, &holdout].map(|pixels| pixels[middle].coverage.hit_fraction());
+        assert_eq!(covered, [1.0, 0.0], "{method:?}");
+        if !matches!(method, Method::Mlt | Method::Light) {
+            let row = 11 * SIZE as usize;
+            let [a, b] = [&plain, &holdout].map(|of| of[row..].iter().map(|pixel| pixel.mean(0).x).sum::<f64>());
+            assert!((a / b - 1.0).abs() < 0.05, "{method:?}: the floor is {a} and {b}");
+        }
+    }
+}
