@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import bpy
 
 import attributes
+import camera_coordinates
 from graph import is_constant, source_socket, upstream
 
 _DEPENDS_ON_VIEW = {
@@ -122,7 +123,7 @@ def fix_view_dependence(graph, surface, tree, say):
                 "Instancer")
         elif node.type == "ATTRIBUTE" and node.attribute_type == "INSTANCER":
             attributes.read_from_object(node)
-        elif output.name in _DEPENDS_ON_VIEW.get(node.type, ()):
+        elif output.name in _DEPENDS_ON_VIEW.get(node.type, ()) and not camera_coordinates.replace(output):
             _replace(output, _typical(node, output))
             if node.as_pointer() not in known:
                 say(f"{output.name} of its {node.bl_label} node depends on the view: its mean over all directions is "

@@ -227,6 +227,17 @@ class Agrees(cycles_comparison.CyclesComparison):
         self.silhouettes_agree(self.caustique(16), self.cycles(16))
         self.assertEqual(self.warnings, [])
 
+    def test_window_coordinates(self):
+        """They are a function of the position, also for a shifted film."""
+        material = glow("tested", (1, 1, 1))
+        tree = material.node_tree
+        shared.place("floor", square(material, 1.5, "floor"), (0, 0, 0))
+        eye((0.3, -2.5, 1.5), (0, 0, 0), lens=40, shift_x=0.1)
+        tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Window"],
+                       next(n for n in tree.nodes if n.type == "EMISSION").inputs["Color"])
+        self.alike(self.caustique(), self.cycles())
+        self.assertNotIn("depends on the view", "".join(self.warnings))
+
     def test_panoramas(self):
         """Equirectangular cameras and fisheyes see what they see in Cycles; others become perspective cameras."""
         self.floor(1.0)

@@ -150,6 +150,18 @@ def light_linking(stage):
 
 
 @feature
+def light_linking_except(stage):
+    """All objects but the body receive the light of the lamp; the body also shines on the floor alone."""
+    unlit, lit = (bpy.data.collections.new(name) for name in ("unlit", "lit"))
+    unlit.objects.link(stage.body)
+    unlit.collection_objects[0].light_linking.link_state = "EXCLUDE"
+    stage.lamp.light_linking.receiver_collection = unlit
+    lit.objects.link(stage.floor)
+    stage.body.light_linking.receiver_collection = lit
+    stage.principled(**GREY, Emission_Color=(1, 0.5, 0.1), Emission_Strength=2.0)
+
+
+@feature
 def world_gradient(stage):
     _world_node(stage, "TexGradient", _turned(stage, (0, -math.pi / 2, 0.3)))
 
@@ -207,6 +219,16 @@ def camera_focus(stage):
 @feature
 def camera_panoramic(stage):
     stage.camera.data.type = "PANO"
+    stage.principled(**GREY)
+
+
+@feature
+def camera_equirectangular(stage):
+    settings = stage.camera.data
+    settings.type = "PANO"
+    settings = settings if hasattr(settings, "panorama_type") else settings.cycles
+    settings.panorama_type = "EQUIRECTANGULAR"
+    settings.longitude_min, settings.longitude_max, settings.latitude_min = -1.0, 0.5, -1.0
     stage.principled(**GREY)
 
 

@@ -303,7 +303,19 @@ def by_other_object(stage):
 
 @feature
 def by_window(stage):
+    stage.scene.render.resolution_x = stage.scene.render.resolution_y = 32
     _by(stage, _coordinates(stage, "Window"))
+
+
+@feature
+def by_camera(stage):
+    _by(stage, _coordinates(stage, "Camera"))
+
+
+@feature
+def by_view_distance(stage):
+    fade = stage.node("MapRange", stage.node("CameraData").outputs["View Distance"], 3.0, 5.0)
+    stage.principled(Base_Color=fade.outputs[0], Roughness=0.5)
 
 
 @feature

@@ -13,10 +13,11 @@ use crate::stop::Stop;
 use std::path::Path;
 
 /// Names and contents of the exporter's files (in Python), embedded in the program.
-const SOURCES: [(&str, &str); 32] = [
+const SOURCES: [(&str, &str); 33] = [
     ("attributes.py", include_str!("../../../scripts/blender/attributes.py")),
     ("bake.py", include_str!("../../../scripts/blender/bake.py")),
     ("bake_cache.py", include_str!("../../../scripts/blender/bake_cache.py")),
+    ("camera_coordinates.py", include_str!("../../../scripts/blender/camera_coordinates.py")),
     ("camera_export.py", include_str!("../../../scripts/blender/camera_export.py")),
     ("closures.py", include_str!("../../../scripts/blender/closures.py")),
     ("direct_images.py", include_str!("../../../scripts/blender/direct_images.py")),
