@@ -7,44 +7,36 @@ their own.
 
 import bpy
 
-# {key of the scene format: property of Blender}
-_KINDS = {"receivers": "receiver_collection"}
-
 
 class Links:
     """The links of all objects of the file."""
 
     def __init__(self):
-        # For each kind: {name of an object: names of its collections}
-        self._collections = {kind: {} for kind in _KINDS}
-        self._of_lights = {}
+        # {name of an object: names of its collections}, and {name of an object: the key `receivers`}
+        self._collections, self._receivers = {}, {}
         read = {}
         for thing in bpy.data.objects:
-            for kind, name in _KINDS.items():
-                collection = getattr(getattr(thing, "light_linking", None), name, None)
-                if collection is not None:
-                    if (kind, collection) not in read:
-                        read[kind, collection] = self._read(kind, collection)
-                    self._of_lights.setdefault(thing.name, {})[kind] = read[kind, collection]
+            collection = thing.light_linking.receiver_collection
+            if collection is not None:
+                if collection not in read:
+                    read[collection] = self._read(collection)
+                self._receivers[thing.name] = read[collection]
 
-    def _read(self, kind, collection):
-        """Note the objects of a collection of this kind. Returns the value of the key."""
+    def _read(self, collection):
+        """Note the objects of a linking collection. Returns the key `receivers`."""
         linked = {}
         for state, thing in _objects(collection):
             name = collection.name if state == "INCLUDE" else f"{collection.name} (excluded)"
             linked[state.lower()] = [name]
-            self._collections[kind].setdefault(thing.name, set()).add(name)
+            self._collections.setdefault(thing.name, set()).add(name)
         return linked
 
     def of(self, thing, instancer):
         """The keys of `extras.caustique` of an object. As in Cycles, the collections of its instancer count, if it has
         some, else its own."""
-        names = set()
-        for known in self._collections.values():
-            names |= known.get(instancer.name, set()) if instancer is not None and instancer.name in known else (
-                known.get(thing.name, set()))
-        keys = {kind: linked for kind, linked in self._of_lights.get(thing.name, {}).items() if linked}
-        return {**({"collections": sorted(names)} if names else {}), **keys}
+        own = instancer if instancer is not None and instancer.name in self._collections else thing
+        keys = {"collections": sorted(self._collections.get(own.name, ())), "receivers": self._receivers.get(thing.name)}
+        return {key: value for key, value in keys.items() if value}
 
 
 def _objects(collection):

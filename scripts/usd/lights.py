@@ -32,9 +32,9 @@ class Light:
             self.add_loss("inputs:shadow:enable = false is not carried: it casts shadows")
         if self.api.GetFiltersRel().GetTargets():
             self.add_loss("light filters are not carried")
-        for collection in (self.api.GetLightLinkCollectionAPI(), self.api.GetShadowLinkCollectionAPI()):
-            if collection.GetIncludesRel().GetTargets() or collection.GetExcludesRel().GetTargets():
-                self.add_loss(f"{collection.GetName()} is not carried: it shines on everything, and all casts shadows")
+        shadows = self.api.GetShadowLinkCollectionAPI()
+        if shadows.GetIncludesRel().GetTargets() or shadows.GetExcludesRel().GetTargets():
+            self.add_loss("shadowLink is not carried: all casts shadows")
 
     def get(self, name, default):
         """The value of the light's input `name`, or `default` if it is unset."""
@@ -103,7 +103,7 @@ def node(prim, stage, document, matrix):
     made = makers[kind](light, document, matrix)
     if made is None:
         return None
-    keys = {**made.pop("caustique", {}), **custom_keys(prim, stage)}
+    keys = {**made.pop("caustique", {}), **stage.links.of_light(prim), **custom_keys(prim, stage)}
     if keys:
         made["extras"] = {"caustique": keys}
     return made

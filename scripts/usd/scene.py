@@ -118,7 +118,7 @@ class Scene:
         elif prim.IsA(UsdGeom.Mesh) or shapes.is_shape(prim) and kind not in _UNSUPPORTED:
             mesh, size = self._mesh(prim)
             if mesh is not None:
-                keys = custom_keys(prim, self._stage)
+                keys = {**self._stage.links.of_mesh(prim), **custom_keys(prim, self._stage)}
                 extras = {"extras": {"caustique": keys}} if keys else {}
                 yield (lambda _: {"name": name, "mesh": mesh, **extras}), Gf.Matrix4d().SetScale(size) * matrix
         elif kind in _UNSUPPORTED:

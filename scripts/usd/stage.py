@@ -8,6 +8,7 @@ from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdSkel
 
 from dependencies import check_regular, named_files, open_layers, outer_file
 from faults import Fault, Invalid, Losses, check_pointer, text_of
+from links import Links
 
 # Limits of metersPerUnit within which squared lengths neither underflow nor overflow.
 _MIN_METRES, _MAX_METRES = 1e-30, 1e30
@@ -36,6 +37,7 @@ class Stage:
             self.stage = Usd.Stage.Open(layers[0] if layers else self.path)
         except Tf.ErrorException as error:
             raise Fault("", f"USD cannot read it: {_first_line(error)}", "export it again; usdchecker may say more")
+        self.links = Links(self.stage)
         # The files that the stage is read from or names, as absolute paths.
         self.files = {self.path}
         for layer in self.stage.GetUsedLayers():

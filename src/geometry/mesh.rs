@@ -88,20 +88,9 @@ impl PackedMesh {
     }
 }
 
-/// Light linking and shadow linking of an object: bits of the linkings of lights. Bit 0, that of lights without linking, is
-/// set.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ObjectLinks {
-    /// Linkings whose light the object receives.
-    pub receives: u64,
-    /// Linkings whose light the object blocks.
-    pub blocks: u64,
-}
-
-impl ObjectLinks {
-    /// The object receives and blocks the light of all lights.
-    pub const ALL: ObjectLinks = ObjectLinks { receives: u64::MAX, blocks: u64::MAX };
-}
+/// Bits of the linkings of lights ([`crate::light::LightLinks`]) of an object that receives the light of all lights. Bit 0 is
+/// that of lights without linking.
+pub const ALL_LINKINGS: u64 = u64::MAX;
 
 /// A mesh placed in the scene.
 #[derive(Clone, Debug)]
@@ -120,8 +109,8 @@ pub struct Instance {
     pub shadow_catcher: bool,
     /// Whether cameras see black without coverage where they see the instance. Other rays hit it.
     pub holdout: bool,
-    /// Lights whose light the instance receives and blocks.
-    pub links: ObjectLinks,
+    /// Linkings of lights whose light the instance receives: a bit for each ([`ALL_LINKINGS`]).
+    pub receives: u64,
     /// Whether the place or the shape of the instance depends on the time while the shutter is open.
     pub moves: bool,
     /// Transform from local to world space; `None` if the mesh is in world space.

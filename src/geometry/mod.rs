@@ -5,7 +5,7 @@ mod precision;
 mod shapes;
 mod surface;
 
-pub use mesh::{Instance, Mesh, ObjectLinks, Placement};
+pub use mesh::{ALL_LINKINGS, Instance, Mesh, Placement};
 pub use precision::{Extent, coordinate_error, offset_origin, shadow_end, triangle_error};
 pub use shapes::Shapes;
 pub use surface::Surface;

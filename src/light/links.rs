@@ -1,27 +1,22 @@
-//! Light linking and shadow linking: which objects receive the light of a light, and which block it.
+//! Light linking: which objects receive the light of a light.
 //!
-//! Light linking multiplies the contribution of a path by 0 or 1. The factor depends on the light and on the object at
-//! the first vertex after it, which all techniques know. No density depends on it, so MIS weights stay as they are.
+//! It multiplies the contribution of a path by 0 or 1. The factor depends on the light and on the object at the first vertex
+//! after it, which all techniques know. No density depends on it, so MIS weights stay as they are.
 
 use super::receiver::Receiver;
 
-/// Largest number of different linkings of the lights of a scene, for light and for shadows each.
+/// Largest number of different linkings of the lights of a scene.
 pub const MAX_LINKINGS: usize = 63;
 
-/// Indices of the linkings of a light: bits of [`crate::geometry::ObjectLinks`]. 0: no linking.
+/// The linking of a light: the bit of the objects that receive its light ([`crate::geometry::Instance::receives`]). 0: all.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Linking {
-    /// Bit of the objects that receive the light.
-    pub receivers: u8,
-    /// Bit of the objects that block the light.
-    pub blockers: u8,
-}
+pub struct Linking(pub u8);
 
 impl Linking {
     /// Whether a receiver is lit by a light with this linking.
     #[inline]
     pub fn lights(self, receiver: &Receiver) -> bool {
-        receiver.links >> self.receivers & 1 == 1
+        receiver.links >> self.0 & 1 == 1
     }
 }
 

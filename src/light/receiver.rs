@@ -1,6 +1,6 @@
 //! Receivers of light.
 
-use crate::geometry::ObjectLinks;
+use crate::geometry::ALL_LINKINGS;
 use crate::math::Vec3;
 
 /// A point that receives light, for which a light is selected.
@@ -13,7 +13,7 @@ pub struct Receiver {
     /// Whether the point is in a participating medium. Lights are then selected by power alone: points along a ray in a
     /// medium are sampled for a given light, so the light has to be selected before the point.
     pub in_medium: bool,
-    /// Linkings whose light the object of the point receives: a bit for each ([`ObjectLinks::receives`]).
+    /// Linkings whose light the object of the point receives: a bit for each ([`crate::geometry::Instance::receives`]).
     pub links: u64,
 }
 
@@ -21,6 +21,6 @@ impl Receiver {
     /// A receiver outside media that light reaches from any direction.
     #[inline]
     pub fn anywhere(p: Vec3) -> Receiver {
-        Receiver { p, n: Vec3::ZERO, in_medium: false, links: ObjectLinks::ALL.receives }
+        Receiver { p, n: Vec3::ZERO, in_medium: false, links: ALL_LINKINGS }
     }
 }

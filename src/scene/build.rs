@@ -4,7 +4,7 @@ use super::description::{self, Description, EnvironmentSource, PunctualLight};
 use super::nesting::{Volumes, alpha_solids};
 use super::{Contacts, Scene, SolidStacks, Survey, dense, links};
 use crate::error::Result;
-use crate::geometry::{Instance, Mesh, ObjectLinks, Placement, Shapes};
+use crate::geometry::{ALL_LINKINGS, Instance, Mesh, Placement, Shapes};
 use crate::light::{
     Bulb, Distribution, Emitter, Environment, Group, Groups, ImageEnvironment, Light, LightPlacement, Lights,
     MAX_GROUP_NAME, MAX_GROUPS, Pattern, PointLight, ShapedLight, Sky, SpotCone,
@@ -44,8 +44,8 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
 
     let linked = links::resolve(&description, first_light_sphere, &mut warnings);
     let mut shapes = place_instances(&mut description, origin);
-    for (instance, &links) in shapes.instances.iter_mut().zip(&linked.objects) {
-        instance.links = links;
+    for (instance, &receives) in shapes.instances.iter_mut().zip(&linked.objects) {
+        instance.receives = receives;
     }
     let shapes = Arc::new(shapes);
     let mut materials = Materials { list: description.materials, textures: description.textures.into() };
@@ -348,7 +348,7 @@ fn place_instances(description: &mut Description, origin: DVec3) -> Shapes {
             hidden_from_camera: placed.hidden_from_camera,
             shadow_catcher: placed.shadow_catcher,
             holdout: placed.holdout,
-            links: ObjectLinks::ALL,
+            receives: ALL_LINKINGS,
             moves: placed.moves,
             to_world: shared.then(|| placement(&to_world)),
         });

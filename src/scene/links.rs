@@ -1,19 +1,18 @@
-//! Resolves light linking and shadow linking, which a scene file gives by collections of nodes, to bits of objects.
+//! Resolves light linking, which a scene file gives by collections of nodes, to bits of objects.
 
 use super::description::{Description, Linked, Links, PlacedMesh};
-use crate::geometry::ObjectLinks;
 use crate::light::{LightLinks, Linking, MAX_LINKINGS};
 use std::collections::HashSet;
 
 /// Light linking of all objects and lights.
 pub(super) struct Resolved {
-    /// For each instance, the linkings whose light it receives and blocks.
-    pub objects: Vec<ObjectLinks>,
+    /// For each instance, the bits of the linkings whose light it receives.
+    pub objects: Vec<u64>,
     /// The linking of each light.
     pub lights: LightLinks,
 }
 
-/// The different linkings of one kind. The index of a linking plus 1 is its bit in [`ObjectLinks`].
+/// The different linkings. The index of a linking plus 1 is its bit ([`Linking`]).
 #[derive(Default)]
 struct Linkings<'d>(Vec<&'d Linked>);
 
@@ -48,8 +47,7 @@ pub(super) fn resolve(description: &Description, first_light_sphere: u32, warnin
     let surfaces = instances.iter().map(|placed| (&placed.name, placed.links.as_deref().filter(|_| glows(placed))));
     let others = lights.iter().filter(|light| !light.is_sphere()).map(|light| (&light.name, light.links.as_deref()));
     let sources = surfaces.chain(others);
-    let is_all = |links: &Links| links.receivers.is_all() && links.blockers.is_all();
-    if sources.clone().all(|(_, links)| links.is_none_or(is_all)) {
+    if sources.clone().all(|(_, links)| links.is_none_or(|links| links.receivers.is_all())) {
         return Resolved { objects: Vec::new(), lights: LightLinks::default() };
     }
     let known: HashSet<&str> = instances
@@ -57,17 +55,16 @@ pub(super) fn resolve(description: &Description, first_light_sphere: u32, warnin
         .flat_map(|placed| placed.links.iter().flat_map(|l| &l.collections))
         .map(|name| &**name)
         .collect();
-    let (mut receivers, mut blockers) = (Linkings::default(), Linkings::default());
+    let mut linkings = Linkings::default();
     let mut warn = |warning: String| {
         if !warnings.contains(&warning) {
             warnings.push(warning);
         }
     };
-    let linkings: Vec<Linking> = sources
+    let of_lights: Vec<Linking> = sources
         .map(|(name, links)| {
-            let Some(links) = links else { return Linking::default() };
-            let Links { receivers: lit, blockers: shades, .. } = links;
-            for missing in [lit, shades].into_iter().flat_map(|linked| linked.include.iter().chain(&linked.exclude)) {
+            let Some(Links { receivers, .. }) = links else { return Linking::default() };
+            for missing in receivers.include.iter().chain(&receivers.exclude) {
                 if !known.contains(&**missing) {
                     warn(format!(
                         "light \"{name}\": its linking names the collection \"{missing}\", in which no object is (add \
@@ -75,26 +72,18 @@ pub(super) fn resolve(description: &Description, first_light_sphere: u32, warnin
                     ));
                 }
             }
-            let [receivers, blockers] = [receivers.bit(lit), blockers.bit(shades)].map(|bit| {
-                bit.unwrap_or_else(|| {
-                    warn(format!(
-                        "light \"{name}\": its linking is left out, because there are {MAX_LINKINGS} others (link \
-                         more lights to the same collections)"
-                    ));
-                    0
-                })
-            });
-            Linking { receivers, blockers }
+            Linking(linkings.bit(receivers).unwrap_or_else(|| {
+                warn(format!(
+                    "light \"{name}\": its linking is left out, because there are {MAX_LINKINGS} others (link more \
+                     lights to the same collections)"
+                ));
+                0
+            }))
         })
         .collect();
-    let links_of = |collections: &[String]| ObjectLinks {
-        receives: receivers.bits(collections),
-        blocks: blockers.bits(collections),
-    };
-    let objects =
-        instances.iter().map(|placed| links_of(placed.links.as_ref().map_or(&[], |links| &links.collections)));
-    let (objects, medium_receives) = (objects.collect(), receivers.bits(&[]));
-    let (surfaces, others) = linkings.split_at(instances.len());
+    let objects = instances.iter().map(|placed| linkings.bits(placed.links.as_ref().map_or(&[], |links| &links.collections)));
+    let (objects, medium_receives) = (objects.collect(), linkings.bits(&[]));
+    let (surfaces, others) = of_lights.split_at(instances.len());
     let lights = LightLinks { instances: surfaces.to_vec(), others: others.to_vec(), medium_receives };
     Resolved { objects, lights }
 }

@@ -34,7 +34,7 @@ pub use survey::Survey;
 pub use view::View;
 
 use crate::error::Result;
-use crate::geometry::{ObjectLinks, Shapes, Surface};
+use crate::geometry::{ALL_LINKINGS, Shapes, Surface};
 use crate::light::{Environment, Light, Lights, Owner};
 use crate::material::{Materials, MediumParameters, Scattering};
 use crate::math::{DVec3, Vec3};
@@ -159,13 +159,13 @@ impl Scene {
         self.survey.culled && self.materials.list[surface.material as usize].culled && direction.dot(surface.ng) > 0.0
     }
 
-    /// Linkings whose light the instance (object) receives ([`ObjectLinks::receives`]).
+    /// Linkings whose light the instance (object) receives ([`crate::geometry::Instance::receives`]).
     #[inline]
     pub fn receives(&self, instance: u32) -> u64 {
         if self.lights.links().is_empty() {
-            return ObjectLinks::ALL.receives;
+            return ALL_LINKINGS;
         }
-        self.shapes.instances[instance as usize].links.receives
+        self.shapes.instances[instance as usize].receives
     }
 
     /// The name of a light in messages: `light "Sun"`, or `object "Panel"` for an emissive triangle or

@@ -43,6 +43,16 @@ class Irradiance(usd_support.Stages):
         self.light("SphereLight", matrix=down(HEIGHT), radius=0.25, intensity=3.0)
         self.check(3 * math.pi * (0.25 / HEIGHT) ** 2)
 
+    def test_light_linking(self):
+        """A light shines on the prims of its collection lightLink, and on no others."""
+        light = self.light("SphereLight", matrix=down(HEIGHT), radius=0.25, intensity=3.0)
+        links = UsdLux.LightAPI(light.GetPrim()).GetLightLinkCollectionAPI()
+        links.CreateIncludeRootAttr(False)
+        links.CreateIncludesRel().SetTargets(["/Floor"])
+        other = self.light("SphereLight", "/Other", matrix=down(HEIGHT), radius=0.25, intensity=5.0)
+        UsdLux.LightAPI(other.GetPrim()).GetLightLinkCollectionAPI().CreateExcludesRel().SetTargets(["/Floor"])
+        self.check(3 * math.pi * (0.25 / HEIGHT) ** 2)
+
     def test_sphere_normalized_and_scaled(self):
         scale = Gf.Matrix4d().SetScale(2.0)
         self.light("SphereLight", matrix=scale * down(HEIGHT), radius=0.1, intensity=30.0, normalize=True, exposure=1.0)

@@ -178,13 +178,12 @@ pub(super) struct ObjectExtras {
     pub(super) holdout: bool,
 }
 
-/// Light linking and shadow linking in `extras.caustique` of a node with a mesh or a light.
+/// Light linking in `extras.caustique` of a node with a mesh or a light.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct LinkExtras {
     pub(super) collections: Vec<String>,
     pub(super) receivers: Linked,
-    pub(super) blockers: Linked,
 }
 
 /// Content of `extras.caustique` of a camera, or of its node.
@@ -398,9 +397,6 @@ pub(super) const NODE: &[&str] = &[
     "receivers",
     "receivers.include",
     "receivers.exclude",
-    "blockers",
-    "blockers.include",
-    "blockers.exclude",
     "ies",
     "ies.file",
     "ies.bufferView",

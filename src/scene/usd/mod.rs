@@ -18,7 +18,7 @@ use std::path::Path;
 const EXTENSIONS: [&str; 4] = ["usd", "usda", "usdc", "usdz"];
 
 /// Names and contents of the files of the USD converter (in Python), embedded in the program.
-const SOURCES: [(&str, &str); 21] = [
+const SOURCES: [(&str, &str); 22] = [
     ("cameras.py", include_str!("../../../scripts/usd/cameras.py")),
     ("convert.py", include_str!("../../../scripts/usd/convert.py")),
     ("dependencies.py", include_str!("../../../scripts/usd/dependencies.py")),
@@ -28,6 +28,7 @@ const SOURCES: [(&str, &str); 21] = [
     ("guard.py", include_str!("../../../scripts/usd/guard.py")),
     ("layers.json", include_str!("../../../scripts/usd/layers.json")),
     ("lights.py", include_str!("../../../scripts/usd/lights.py")),
+    ("links.py", include_str!("../../../scripts/usd/links.py")),
     ("materials.py", include_str!("../../../scripts/usd/materials.py")),
     ("materialx.py", include_str!("../../../scripts/usd/materialx.py")),
     ("meshes.py", include_str!("../../../scripts/usd/meshes.py")),

@@ -11,7 +11,7 @@
 //! probabilities of their common decisions ([`Presence::chance`]), which both have sampled, divides the contribution
 //! and multiplies the density of the technique in MIS weights.
 
-use crate::geometry::{ObjectLinks, Placement};
+use crate::geometry::{ALL_LINKINGS, Placement};
 use crate::material::{Material, MediumParameters};
 use crate::math::Vec3;
 use crate::medium::{GridRay, MediumGrids};
@@ -303,11 +303,11 @@ impl Interior {
         if self.outer == EMPTY_STACK { inner } else { stronger(scene, self.outer, inner) }
     }
 
-    /// Linkings whose light the medium around the path receives ([`crate::geometry::ObjectLinks::receives`]).
+    /// Linkings whose light the medium around the path receives ([`crate::geometry::Instance::receives`]).
     #[inline]
     pub fn receives(&self, scene: &Scene) -> u64 {
         if scene.lights.links().is_empty() {
-            return ObjectLinks::ALL.receives;
+            return ALL_LINKINGS;
         }
         self.host(scene).map_or(scene.lights.links().medium_receives, |instance| scene.receives(instance))
     }
