@@ -44,10 +44,15 @@ def _world(scene, path, black, warn):
     if shader is None:
         return said, None
     by_ray = [s for node in output.id_data.nodes if node.type == "LIGHT_PATH" for s in node.outputs if s.is_linked]
-    background = _surroundings(scene, output, path, "background", lambda: None, warn)[0] if by_ray else None
+    background = None
     with contextlib.ExitStack() as undo:
         for socket in by_ray:
-            _cut(socket, undo)
+            _cut(socket, float(socket.name == "Is Camera Ray"), undo)
+        if by_ray:
+            background, _ = _surroundings(scene, output, path, "background", lambda: None, warn)
+    with contextlib.ExitStack() as undo:
+        for socket in by_ray:
+            _cut(socket, 0.0, undo)
         said["environment"], disc = _surroundings(
             scene, output, path, "environment", lambda: sky.sun(scene, undo, where, warn), warn)
     if background is not None:
@@ -79,8 +84,8 @@ def _surroundings(scene, output, path, name, find_sun, warn):
     return said, found
 
 
-def _cut(socket, undo):
-    """Make the links of an output carry 0 until `undo` closes."""
+def _cut(socket, value, undo):
+    """Make the links of an output carry a number until `undo` closes."""
     tree = socket.id_data
     for link in list(socket.links):
         to = link.to_socket
@@ -88,7 +93,7 @@ def _cut(socket, undo):
         undo.callback(tree.links.new, socket, to)
         undo.callback(setattr, to, "default_value", before)
         tree.links.remove(link)
-        to.default_value = 0 if to.type == "VALUE" else [0.0] * len(before)
+        to.default_value = value if to.type == "VALUE" else [value] * len(before)
 
 
 def _add_visibility(world, environment, where, warn):

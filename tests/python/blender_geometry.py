@@ -176,7 +176,6 @@ class Geometry(cycles_comparison.CyclesComparison):
             self.put(name, x, 0, (1, 1, 1))
         bpy.data.objects["out"].is_holdout = True
         apart = self.collection("apart")
-        self.scene.collection.children.link(apart)
         apart.objects.link(bpy.data.objects["of a collection"])
         bpy.context.view_layer.layer_collection.children["apart"].holdout = True
         self.look(4)

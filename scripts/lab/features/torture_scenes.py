@@ -218,6 +218,7 @@ def camera_focus(stage):
 
 @feature
 def camera_panoramic(stage):
+    stage.scene.render.resolution_x = stage.scene.render.resolution_y = 32
     stage.camera.data.type = "PANO"
     stage.principled(**GREY)
 
