@@ -49,11 +49,11 @@ def _world(scene, path, black, warn):
         for socket in by_ray:
             _cut(socket, float(socket.name == "Is Camera Ray"), undo)
         if by_ray:
-            background, _ = _surroundings(scene, output, path, "background", lambda: None, warn)
+            background, _ = _environment(scene, output, path, "background", lambda: None, warn)
     with contextlib.ExitStack() as undo:
         for socket in by_ray:
             _cut(socket, 0.0, undo)
-        said["environment"], disc = _surroundings(
+        said["environment"], disc = _environment(
             scene, output, path, "environment", lambda: sky.sun(scene, undo, where, warn), warn)
     if background is not None:
         said["environment"]["background"] = background
@@ -68,7 +68,7 @@ def _world(scene, path, black, warn):
     return said, disc
 
 
-def _surroundings(scene, output, path, name, find_sun, warn):
+def _environment(scene, output, path, name, find_sun, warn):
     """The key `environment` of the world's surface, and what `find_sun` returns if the world is baked, to an image with
     `name` in its file name."""
     shader = source(output.inputs["Surface"])

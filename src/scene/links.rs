@@ -81,7 +81,8 @@ pub(super) fn resolve(description: &Description, first_light_sphere: u32, warnin
             }))
         })
         .collect();
-    let objects = instances.iter().map(|placed| linkings.bits(placed.links.as_ref().map_or(&[], |links| &links.collections)));
+    let objects =
+        instances.iter().map(|placed| linkings.bits(placed.links.as_ref().map_or(&[], |links| &links.collections)));
     let (objects, medium_receives) = (objects.collect(), linkings.bits(&[]));
     let (surfaces, others) = of_lights.split_at(instances.len());
     let lights = LightLinks { instances: surfaces.to_vec(), others: others.to_vec(), medium_receives };

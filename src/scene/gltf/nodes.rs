@@ -373,9 +373,9 @@ impl<'r> Reader<'r> {
         let folder = self.document.folder;
         if let Some(background) = &extras.background {
             self.out.background =
-                surroundings(folder, "environment.background", background, place, &mut self.out.warnings)?;
+                read_environment(folder, "environment.background", background, place, &mut self.out.warnings)?;
         }
-        let found = surroundings(folder, "environment", extras, place, &mut self.out.warnings)?;
+        let found = read_environment(folder, "environment", extras, place, &mut self.out.warnings)?;
         let Some(environment) = found else { return Ok(()) };
         // A black environment is none.
         if matches!(environment.source, EnvironmentSource::Color(Rgb::ZERO)) {
@@ -734,7 +734,7 @@ impl<'r> Reader<'r> {
 }
 
 /// Reads the colour or the image of the key `key`; `None`, with a warning, if it has neither or both.
-fn surroundings(
+fn read_environment(
     folder: Folder,
     key: &str,
     extras: &EnvironmentExtras,
