@@ -55,13 +55,14 @@ fn cameras_see_the_background_and_mirrors_the_environment_by_all_methods() {
 #[test]
 fn holdouts_are_black_and_light_others_by_all_methods() {
     let middle = (6 * SIZE + 6) as usize;
+    let around = [5, 6].map(|y| [5, 6].map(|x| (y * SIZE + x) as usize)).concat();
     for &method in Method::ALL {
         let [plain, holdout] = [false, true].map(|holdout| picture(outdoors(holdout), method).pixels);
         assert_eq!(holdout[middle].mean(0), DVec3::ZERO, "{method:?}");
         if matches!(method, Method::Mlt | Method::Light) {
             continue;
         }
-        assert!(plain[middle].mean(0).x > 0.0, "{method:?}");
+        assert!(around.iter().any(|&pixel| plain[pixel].mean(0).x > 0.0), "{method:?}");
         let covered = [&plain, &holdout].map(|pixels| pixels[middle].coverage.hit_fraction());
         assert_eq!(covered, [1.0, 0.0], "{method:?}");
         let row = 11 * SIZE as usize;

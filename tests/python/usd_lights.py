@@ -49,7 +49,7 @@ class Irradiance(usd_support.Stages):
         links = UsdLux.LightAPI(light.GetPrim()).GetLightLinkCollectionAPI()
         links.CreateIncludeRootAttr(False)
         links.CreateIncludesRel().SetTargets(["/Floor"])
-        other = self.light("SphereLight", "/Other", matrix=down(HEIGHT), radius=0.25, intensity=5.0)
+        other = self.light("SphereLight", "/Other", matrix=down(HEIGHT), radius=0.25, intensity=1.0)
         UsdLux.LightAPI(other.GetPrim()).GetLightLinkCollectionAPI().CreateExcludesRel().SetTargets(["/Floor"])
         self.check(3 * math.pi * (0.25 / HEIGHT) ** 2)
 

@@ -385,6 +385,18 @@ fn lamps() -> Cases {
         ("an aperture without a focus", json!({"/cameras/0/extras/caustique": {"aperture_radius": 1}})),
         ("a near plane", json!({"/cameras/0/perspective/znear": 5})),
         ("a far plane", json!({"/cameras/0/perspective/zfar": 0.5})),
+        (
+            "a panorama from right to left",
+            json!({"/cameras/0/extras/caustique/panorama": {"longitude_deg": [90, -90]}}),
+        ),
+        (
+            "a fisheye of no angle",
+            json!({"/cameras/0/extras/caustique/panorama": {"fisheye": "equisolid", "fov_deg": 0}}),
+        ),
+        (
+            "a fisheye of no size",
+            json!({"/cameras/0/extras/caustique/panorama": {"fisheye": "equidistant", "half_size": [0, 1]}}),
+        ),
         ("a shift beyond numbers", json!({"/cameras/0/extras/caustique/shift": [1e300, 0]})),
     ]
 }
