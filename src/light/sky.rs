@@ -13,7 +13,7 @@ pub struct Sky {
     pub radius: f32,
     /// The light from all directions around the scene; `None` if the scene has no environment.
     pub environment: Option<Environment>,
-    /// What camera rays see instead of `environment`; `None` if they see it.
+    /// The environment that camera rays see instead of `environment`; `None` if they see `environment`.
     pub background: Option<Environment>,
     /// Whether camera rays do not see the environment, although it lights the scene.
     pub hidden_from_camera: bool,

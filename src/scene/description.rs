@@ -41,7 +41,7 @@ pub struct Description {
     pub environment: Option<EnvironmentDescription>,
     /// Whether camera rays do not see the environment; it lights the scene anyway.
     pub environment_hidden_from_camera: bool,
-    /// What cameras see instead of `environment`; `None` if they see it.
+    /// The environment that cameras see instead of `environment`; `None` if they see `environment`.
     pub background: Option<EnvironmentDescription>,
     /// Name of the environment's light group (a named set of lights with a layer of its own), if it has one.
     pub environment_light_group: Option<String>,

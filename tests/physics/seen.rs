@@ -1,4 +1,4 @@
-//! What cameras alone see: holdouts, and a background instead of the environment, by all methods.
+//! Holdouts, and backgrounds that cameras see instead of the environment, by all methods.
 
 use crate::support;
 

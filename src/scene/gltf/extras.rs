@@ -74,7 +74,7 @@ pub(super) struct EnvironmentExtras {
     pub(super) strength: Option<f32>,
     pub(super) visible: Visible,
     pub(super) light_group: Option<String>,
-    /// What cameras see instead.
+    /// The environment that cameras see instead.
     pub(super) background: Option<Box<EnvironmentExtras>>,
 }
 
@@ -375,41 +375,9 @@ pub(super) const LIGHT: &[&str] = &[
     "gobo.texture",
     "gobo.view_deg",
 ];
-pub(super) const NODE: &[&str] = &[
-    "aperture_radius",
-    "focus_distance",
-    "shift",
-    "panorama",
-    "panorama.longitude_deg",
-    "panorama.latitude_deg",
-    "panorama.fisheye",
-    "panorama.fov_deg",
-    "panorama.half_size",
-    "radius",
-    "angle_deg",
-    "blend",
-    "visible",
-    "visible.camera",
-    "light_group",
-    "shadow_catcher",
-    "holdout",
-    "collections",
-    "receivers",
-    "receivers.include",
-    "receivers.exclude",
-    "ies",
-    "ies.file",
-    "ies.bufferView",
-    "ies.rotation_deg",
-    "ies.clockwise",
-    "ies.normalize",
-    "ies.angle_scale",
-    "null_bsdf",
-    "bulb",
-    "gobo",
-    "gobo.texture",
-    "gobo.view_deg",
-];
+/// Keys of nodes, beside those of the cameras and lights that they place.
+pub(super) const NODE: &[&str] =
+    &["shadow_catcher", "holdout", "collections", "receivers", "receivers.include", "receivers.exclude"];
 
 /// Reads `extras.caustique` of a part of the document; the default if there are no extras. `place` names the part in
 /// errors.
@@ -424,17 +392,17 @@ pub(super) fn read<T: Default + DeserializeOwned>(part: &Value, place: &str) -> 
     }
 }
 
-/// Adds a warning for each key in `extras.caustique` that is not in `known`.
-pub(super) fn check_keys(part: &Value, known: &[&str], place: &str, warnings: &mut Vec<String>) {
+/// Adds a warning for each key in `extras.caustique` that is in none of the lists `known`.
+pub(super) fn check_keys(part: &Value, known: &[&[&str]], place: &str, warnings: &mut Vec<String>) {
     if let Some(value) = part.get("extras").and_then(|extras| extras.get("caustique")) {
         check_object(value, "", known, place, warnings);
     }
 }
 
-fn check_object(value: &Value, prefix: &str, known: &[&str], place: &str, warnings: &mut Vec<String>) {
+fn check_object(value: &Value, prefix: &str, known: &[&[&str]], place: &str, warnings: &mut Vec<String>) {
     for (key, item) in value.as_object().into_iter().flatten() {
         let path = format!("{prefix}{key}");
-        if known.contains(&path.as_str()) {
+        if known.iter().any(|keys| keys.contains(&path.as_str())) {
             // The content of a texture's reference is glTF's own.
             if path.ends_with("_texture") {
                 continue;
@@ -442,7 +410,7 @@ fn check_object(value: &Value, prefix: &str, known: &[&str], place: &str, warnin
             check_object(item, &format!("{path}."), known, place, warnings);
             continue;
         }
-        let near = known.iter().map(|k| (strsim::levenshtein(&path, k), k)).min();
+        let near = known.iter().copied().flatten().map(|k| (strsim::levenshtein(&path, k), k)).min();
         let near = near.filter(|(d, k)| *d <= 3 || k.starts_with(&path));
         let advice = near.map_or_else(String::new, |(_, k)| format!(" (did you mean \"{k}\"?)"));
         warnings.push(format!("{place}: extras.caustique has no key \"{path}\"{advice}"));

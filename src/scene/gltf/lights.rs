@@ -206,7 +206,7 @@ pub(super) fn light(
     if light.range.is_some() {
         warnings.push(format!("{place}: its range is ignored: light has no maximum distance"));
     }
-    extras::check_keys(raw, extras::LIGHT, &place, warnings);
+    extras::check_keys(raw, &[extras::LIGHT], &place, warnings);
     let (on_light, on_node): (LightExtras, LightExtras) = (extras::read(raw, &place)?, extras::read(node.1, &place)?);
     let length = |value: Option<f32>, what: &str| match value {
         Some(x) if !(x.is_finite() && x >= 0.0) => {
@@ -342,7 +342,7 @@ pub(super) fn camera(
         }
         _ => return Err(fault(place, "it is neither perspective nor orthographic")),
     };
-    extras::check_keys(raw, extras::CAMERA, &place, warnings);
+    extras::check_keys(raw, &[extras::CAMERA], &place, warnings);
     let (on_camera, on_node): (CameraExtras, CameraExtras) =
         (extras::read(raw, &place)?, extras::read(node.1, &place)?);
     let projection = match on_node.panorama.or(on_camera.panorama) {

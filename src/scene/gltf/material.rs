@@ -353,7 +353,7 @@ impl Reader<'_> {
                 self.scattering(&mut material.medium)?;
             }
         }
-        extras::check_keys(self.raw, extras::MATERIAL, self.place, self.warnings);
+        extras::check_keys(self.raw, &[extras::MATERIAL], self.place, self.warnings);
         let own: MaterialExtras = extras::read(self.raw, self.place)?;
         material.priority = own.priority;
         material.optical_contact = own.contact == Some(extras::Contact::Optical);

@@ -184,7 +184,7 @@ struct Part {
     material: u32,
 }
 
-/// What a node passes on to its children.
+/// Properties that a node passes on to its children.
 #[derive(Clone)]
 struct Inherited {
     to_world: DAffine3,
@@ -285,7 +285,7 @@ impl<'r> Reader<'r> {
         };
         let place = named("scene", document.part("scenes", index)["name"].as_str(), index);
         let raw = document.part("scenes", index);
-        extras::check_keys(raw, extras::SCENE, &place, &mut self.out.warnings);
+        extras::check_keys(raw, &[extras::SCENE], &place, &mut self.out.warnings);
         self.scene = extras::read(raw, &place)?;
         if let Some(medium) = &self.scene.medium {
             if medium.density.is_some() || medium.emission.is_some() {
@@ -437,7 +437,8 @@ impl<'r> Reader<'r> {
         let document = self.document;
         let node = &document.nodes[index];
         let name = node.name.clone().unwrap_or_default();
-        extras::check_keys(raw, extras::NODE, place, &mut self.out.warnings);
+        let known = [extras::NODE, extras::CAMERA, extras::LIGHT];
+        extras::check_keys(raw, &known, place, &mut self.out.warnings);
         if let Some(camera) = node.camera {
             let warnings = &mut self.out.warnings;
             let camera = lights::camera(document, camera.value(), (&name, raw), to_world, warnings);
