@@ -12,6 +12,7 @@
 
 mod pilot;
 mod pilot_settings;
+mod trial;
 mod weights;
 
 pub use pilot::PilotResult;

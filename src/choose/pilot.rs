@@ -1,6 +1,7 @@
 //! Candidates of a scene, and the pilot that estimates the noise of each: size of its picture, and iterations.
 
 use super::pilot_settings::{EFFECTS_PHOTON_SHARE, pilot_settings};
+use super::trial::{self, Trial};
 use super::weights::{self, WeighedEffect};
 use crate::camera::Camera;
 use crate::path_class::Effect;
@@ -13,8 +14,8 @@ use crate::scene::{Scene, View};
 const PILOT_WORK_SHARE: f64 = 0.05;
 /// Share of [`PILOT_WORK_SHARE`] that the measurement of effects may take.
 const EFFECTS_WORK_SHARE: f64 = 0.2;
-/// Share of the render's work that the smallest possible pilot may take. It is larger than [`PILOT_WORK_SHARE`] because
-/// in a short render a wrong choice costs more than a pilot.
+/// Share of the render's work that the pilot may take with the trials, or if it is the smallest possible one. It is larger
+/// than [`PILOT_WORK_SHARE`] because in a short render a wrong choice costs more than a pilot.
 const MAX_PILOT_WORK_SHARE: f64 = 0.1;
 /// Smallest number of pixels of a pilot's picture.
 const MIN_PIXELS: f64 = 1024.0;
@@ -30,6 +31,11 @@ const MAX_ITERATIONS: u64 = 256;
 const ITERATIONS: f64 = 16.0;
 /// Work of an iteration of a pilot, which finds three weights of every path, over that of a render's iteration.
 const PILOT_COST: f64 = 4.0;
+/// Share of the render's work that trials of the best candidates may take together.
+const TRIALS_WORK_SHARE: f64 = 0.04;
+/// Largest share of the picture's light that a candidate may sample poorly and have a trial. A trial that misses light
+/// looks better than one that finds it.
+const MAX_POORLY_SAMPLED: f64 = 0.02;
 /// Numbers of light paths per pixel that are compared, in sixteenths.
 const LIGHT_PATHS: [u32; 7] = [1, 2, 4, 8, 16, 32, 64];
 /// Numbers of connections that are compared.
@@ -80,6 +86,8 @@ pub struct PilotResult {
     pub squared_error: f64,
     /// Core-seconds of an iteration of the whole picture, predicted from counted vertices.
     pub seconds_per_iteration: f64,
+    /// Share of the picture's light that the candidate samples so rarely that a trial may miss it.
+    pub(super) poorly_sampled: f64,
     /// Whether `auto` has chosen this candidate for the render.
     pub chosen: bool,
 }
@@ -231,10 +239,13 @@ impl<'a> Pilot<'a> {
         let Some(size) = self.size(&settings, effects_seconds) else {
             return (Vec::new(), Some("the render is too short to try others"));
         };
-        let results = self.results(&size, guided, &settings, settings_of, late);
+        let mut results = self.results(&size, guided, &settings, settings_of, late);
         let complete = results.iter().filter(|result| result.squared_error.is_finite());
         let least = complete.map(|result| result.seconds_per_iteration).fold(f64::INFINITY, f64::min);
         let longest = self.longest_iteration(least, effects_seconds + size.seconds);
+        let left = MAX_PILOT_WORK_SHARE * self.budget - effects_seconds - size.seconds;
+        let seconds = left.min(TRIALS_WORK_SHARE * self.budget);
+        self.try_finalists(&mut results, longest, &size.camera, seconds, settings_of, late);
         (chosen_and_usual(results, longest), None)
     }
 
@@ -267,18 +278,59 @@ impl<'a> Pilot<'a> {
         if settings.stop.requested() {
             return Vec::new();
         }
-        let variances = moments.relative();
+        let (variances, poorly_sampled) = (moments.relative(), moments.poorly_sampled());
         let presence = Presence::of(scene, camera);
-        let result = |(counts, variance): (Counts, f64)| {
+        let result = |((counts, variance), poorly_sampled): ((Counts, f64), f64)| {
             let candidate = Candidate::with_counts(counts, guided && counts.light_paths > 0);
             let settings = settings_of(candidate)?;
             let cost = guided_cost.as_ref().filter(|_| candidate.guided).unwrap_or(&self.cost);
             let seconds_per_iteration = cost.film_seconds(candidate, &settings, camera);
             let finds_all = self.finds_all(settings.method, &presence);
             let squared_error = if finds_all { variance * seconds_per_iteration / self.budget } else { f64::INFINITY };
-            Some(PilotResult { candidate, squared_error, seconds_per_iteration, chosen: false })
+            Some(PilotResult { candidate, squared_error, seconds_per_iteration, poorly_sampled, chosen: false })
         };
-        counts.into_iter().zip(variances).filter_map(result).collect()
+        counts.into_iter().zip(variances).zip(poorly_sampled).filter_map(result).collect()
+    }
+
+    /// Renders a trial of the best candidate of each [`Kind`], and puts the ratio of their measured errors in the place of
+    /// the predicted one. The prediction does not see that camera paths are stratified over the iterations and light
+    /// paths are not. The trials take `seconds` core-seconds at most.
+    fn try_finalists(
+        &self,
+        results: &mut [PilotResult],
+        longest: f64,
+        camera: &Camera,
+        seconds: f64,
+        settings_of: &impl Fn(Candidate) -> Option<Settings>,
+        late: &dyn Fn() -> bool,
+    ) {
+        let Some(best) = best_of(results, longest, |_| true) else { return };
+        let finds_all = |one: &PilotResult| one.squared_error.is_finite() && one.poorly_sampled < MAX_POORLY_SAMPLED;
+        let of_kind = |kind| best_of(results, longest, |one| Kind::of(&one.candidate) == kind && finds_all(one));
+        let mut finalists: Vec<usize> = Kind::ALL.into_iter().filter_map(of_kind).collect();
+        if !finalists.contains(&best) {
+            finalists.push(best);
+        }
+        let (seconds, pixels) = (seconds / finalists.len() as f64, pixel_count(camera));
+        let trial = |&index: &usize| {
+            let candidate = results[index].candidate;
+            let settings = pilot_settings(&settings_of(candidate)?, pixels / self.pixels);
+            let iterations = trial::iterations(seconds / self.cost.iteration_seconds(candidate, &settings, pixels))?;
+            Some((index, Trial { scene: self.view.scene, camera, settings, iterations }))
+        };
+        let trials: Vec<(usize, Trial<'_>)> = finalists.iter().filter_map(trial).collect();
+        if trials.len() < 2 || trials.iter().all(|(index, _)| *index != best) {
+            return;
+        }
+        let Some(variances) = trial::relative_variances(trials.iter().map(|(_, trial)| trial), late) else { return };
+        let errors: Vec<(usize, f64)> = (trials.iter().zip(variances))
+            .map(|((index, _), variance)| (*index, variance * results[*index].seconds_per_iteration))
+            .collect();
+        let own = errors.iter().find(|(index, _)| *index == best).map_or(0.0, |(_, error)| *error);
+        let predicted = results[best].squared_error;
+        for (index, error) in errors.into_iter().filter(|_| own > 0.0) {
+            results[index].squared_error = predicted * error / own;
+        }
     }
 
     /// Whether a method finds all light of the present effects that `vcm` finds. A pilot may miss light that is rare.
@@ -313,12 +365,37 @@ struct PilotSize {
     seconds: f64,
 }
 
+/// The techniques of a candidate besides those of path tracing.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    CameraPaths,
+    LightPaths,
+    Merges,
+}
+
+impl Kind {
+    const ALL: [Kind; 3] = [Kind::CameraPaths, Kind::LightPaths, Kind::Merges];
+
+    fn of(candidate: &Candidate) -> Kind {
+        match candidate.counts {
+            Counts { light_paths: 0, .. } => Kind::CameraPaths,
+            Counts { merging: 0.0, .. } => Kind::LightPaths,
+            _ => Kind::Merges,
+        }
+    }
+}
+
+/// Index of the result with the least expected error, of those whose iteration takes `longest` core-seconds at most.
+fn best_of(results: &[PilotResult], longest: f64, among: impl Fn(&PilotResult) -> bool) -> Option<usize> {
+    let allowed = |&index: &usize| results[index].seconds_per_iteration <= longest && among(&results[index]);
+    let error = |index: usize| results[index].squared_error;
+    (0..results.len()).filter(allowed).min_by(|&a, &b| error(a).total_cmp(&error(b)))
+}
+
 /// Marks the result with the least expected error as chosen, of those whose iteration takes `longest` core-seconds at
 /// most. Returns it with the results of `vcm`, `path` and `bdpt` by default numbers.
 fn chosen_and_usual(mut results: Vec<PilotResult>, longest: f64) -> Vec<PilotResult> {
-    let short = (0..results.len()).filter(|&index| results[index].seconds_per_iteration <= longest);
-    let best = short.min_by(|&a, &b| results[a].squared_error.total_cmp(&results[b].squared_error));
-    if let Some(best) = best {
+    if let Some(best) = best_of(&results, longest, |_| true) {
         results[best].chosen = true;
     }
     let without_merging = Counts { merging: 0.0, ..Counts::DEFAULT };

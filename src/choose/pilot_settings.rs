@@ -70,13 +70,19 @@ pub(super) fn relative_weight(value: f64, floor: f64) -> f64 {
 /// as the error. It is used where it exceeds the median and two camera paths agree on it, as on visible lights.
 pub(super) fn reference_values(pixels: &[PixelAccumulator], (width, height): (u32, u32), levels: Levels) -> Vec<f64> {
     let smoothest = levels.count - 1;
-    let size = Size { width: width as usize, height: height as usize };
-    let value = |index: usize| {
-        let near = window(size, index, MEDIAN_REACH);
-        let mut near: Vec<f64> = near.map(|index| mean(pixels[index].mean(smoothest))).collect();
-        let median = median(&mut near, f64::total_cmp).unwrap_or(0.0);
-        let own = &pixels[index];
+    let medians = median_around((width, height), |index| mean(pixels[index].mean(smoothest)));
+    let value = |(own, median): (&PixelAccumulator, f64)| {
         if levels.two_paths { median.max(mean(own.mean(0)).min(mean(own.mean(smoothest)))) } else { median }
     };
-    (0..pixels.len()).map(value).collect()
+    pixels.iter().zip(medians).map(value).collect()
+}
+
+/// Median of the values around each pixel.
+pub(super) fn median_around((width, height): (u32, u32), value: impl Fn(usize) -> f64) -> Vec<f64> {
+    let size = Size { width: width as usize, height: height as usize };
+    let around = |index: usize| {
+        let mut near: Vec<f64> = window(size, index, MEDIAN_REACH).map(&value).collect();
+        median(&mut near, f64::total_cmp).unwrap_or(0.0)
+    };
+    (0..size.pixels()).map(around).collect()
 }

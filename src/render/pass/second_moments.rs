@@ -41,6 +41,8 @@ use rayon::prelude::*;
 const BLOCK: f64 = 8.0;
 /// Share of the blocks, those with the largest moments, that the mean over blocks leaves out.
 const TRIMMED_SHARE: f64 = 0.001;
+/// Density of a sample of the proxy over that of a candidate above which the candidate samples this light poorly.
+const POOR: f64 = 16.0;
 /// Numbers of light paths (relative) and connections of the three sets of weights of a path.
 const VARIANTS: [(f32, f32); 3] = [(1.0, 1.0), (1.0, 2.0), (2.0, 1.0)];
 
@@ -193,6 +195,8 @@ struct Sums {
     moment: f64,
     /// Values of the samples of camera, connections and merges.
     values: [Rgb; 3],
+    /// Light of the samples that the candidate hardly ever takes.
+    poorly_sampled: f64,
 }
 
 impl Sums {
@@ -215,6 +219,9 @@ impl Sums {
                 sample.unspared
             };
             self.moment += mean_square(sample.value) * ratio / sample.worth * roulette;
+            if ratio > POOR {
+                self.poorly_sampled += mean(sample.value);
+            }
             if sample.group == Correlated::None {
                 continue;
             }
@@ -235,6 +242,10 @@ impl Sums {
         let mean = camera + connections * c as f32 + merges * factors.merged as f32;
         self.moment / count - mean_square(mean) + c * (c - 1.0) * mean_square(connections)
     }
+}
+
+fn mean(value: Rgb) -> f64 {
+    f64::from(value.element_sum()) / 3.0
 }
 
 fn mean_square(value: Rgb) -> f64 {
@@ -423,6 +434,7 @@ impl Walks<'_, '_> {
         for (block, sums) in blocks.iter_mut().zip(rows.iter().flat_map(|row| &row.blocks)) {
             for (total, sums) in block.sums.iter_mut().zip(sums) {
                 total.moment += sums.moment;
+                total.poorly_sampled += sums.poorly_sampled;
                 total.values.iter_mut().zip(sums.values).for_each(|(total, value)| *total += value);
             }
         }
@@ -563,7 +575,7 @@ impl Walks<'_, '_> {
 
 /// The light of a sample, with its pixel; `None` if it is not finite.
 fn lit_pixel(pixel: usize, value: Rgb) -> Option<(usize, f64)> {
-    let light = f64::from(value.element_sum()) / 3.0;
+    let light = mean(value);
     light.is_finite().then_some((pixel, light))
 }
 
@@ -578,6 +590,14 @@ impl SecondMoments {
         let pixels: f64 = self.blocks.iter().map(|block| block.pixels).sum();
         let sum = |candidate| self.blocks.iter().map(|block| self.indirect_variance(block, candidate)).sum::<f64>();
         (0..self.candidates.len()).map(|candidate| sum(candidate) / pixels).collect()
+    }
+
+    /// Share of the picture's light, by candidate, that the candidate samples with less than a sixteenth of the proxy's
+    /// density. A short render by the candidate may miss it, and look free of noise.
+    pub fn poorly_sampled(&self) -> Vec<f64> {
+        let light: f64 = self.blocks.iter().map(|block| block.light).sum();
+        let poor = |candidate: usize| self.blocks.iter().map(|block| block.sums[candidate].poorly_sampled).sum::<f64>();
+        (0..self.candidates.len()).map(|candidate| poor(candidate) / light.max(f64::MIN_POSITIVE)).collect()
     }
 
     /// Mean relative variance of an iteration of each candidate over the picture, without the worst blocks.
