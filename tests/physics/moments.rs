@@ -6,11 +6,13 @@
 
 use crate::support;
 
+use caustique::choose::choose;
 use caustique::math::{DVec3, Vec3};
 use caustique::path_class::{ClassSet, Effect};
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::render::{Candidate, Control, Counts, Levels, Proxy, Settings, render};
-use caustique::scene::{Description, Scene};
+use caustique::scene::{Description, Scene, View};
+use caustique::stop::Stop;
 use std::ops::Range;
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, quad, sphere, square};
 use support::stats::{Check, ERROR_RATE, mean_and_error, t_critical};
@@ -153,4 +155,77 @@ fn a_late_proxy_keeps_two_iterations() {
     let variances = |iterations, late: &dyn Fn() -> bool| proxy.measure(None, iterations, late).relative();
     assert_eq!(variances(50, &|| true), variances(2, &|| false));
     assert_ne!(variances(3, &|| false), variances(2, &|| false));
+}
+
+/// A matte room that a panel on the wall lights, with two boxes.
+fn matte_room() -> Scene {
+    let mut description = Description::default();
+    let corners = [Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 3.0)];
+    add(&mut description, "room", cuboid(corners[0], corners[1], true), matte(0.7, 0.0));
+    let panel = quad(Vec3::new(-0.6, 0.8, -0.98), Vec3::X * 1.2, Vec3::Y * 0.8);
+    add(&mut description, "panel", panel, matte(0.0, 3.0));
+    for (name, x) in [("left", -0.6), ("right", 0.3)] {
+        let low = Vec3::new(x, 0.0, 0.1);
+        add(&mut description, name, cuboid(low, low + Vec3::new(0.35, 0.6, 0.35), false), matte(0.5, 0.0));
+    }
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 2.8), DVec3::new(0.0, 0.6, 0.0), 50.0));
+    build(description)
+}
+
+/// Relative variance of an iteration, between renders with different seeds.
+fn relative_variance(scene: &Scene, candidate: Candidate, size: u32) -> f64 {
+    let camera = scene.camera(&square(size)).expect("a camera");
+    let picture = |seed| -> Vec<f64> {
+        let settings = Settings { seed, iterations: Some(64), ..Settings::for_candidate(candidate) };
+        let level = settings.levels.picture_level();
+        let rendered = render(scene, &camera, &settings, |_, _| Control::Continue);
+        rendered.pixels.iter().map(|pixel| pixel.mean(level).element_sum() / 3.0).collect()
+    };
+    let pictures: Vec<Vec<f64>> = (100..100 + SEEDS).map(picture).collect();
+    let n = SEEDS as f64;
+    let of_pixel = |index: usize| {
+        let mean = pictures.iter().map(|picture| picture[index]).sum::<f64>() / n;
+        let squares = pictures.iter().map(|picture| (picture[index] - mean).powi(2)).sum::<f64>();
+        64.0 * squares / (n - 1.0) / (mean * mean)
+    };
+    let mut all: Vec<f64> = (0..pictures[0].len()).map(of_pixel).collect();
+    all.sort_by(f64::total_cmp);
+    all.truncate(all.len() - all.len() / 100);
+    all.iter().sum::<f64>() / all.len() as f64
+}
+
+/// The errors that `auto` compares include what the prediction from independent samples cannot see: the ratio of path
+/// tracing to `bdpt` is that of renders, and the predicted one is not.
+#[test]
+fn trials_measure_the_noise_of_renders() {
+    const SIZE: u32 = 24;
+    let scene = matte_room();
+    let counts = [Counts::PATHS, Counts { merging: 0.0, ..Counts::DEFAULT }];
+    let [paths, connections] = counts.map(|counts| Candidate::with_counts(counts, false));
+    let camera = scene.camera(&square(SIZE)).expect("a camera");
+    let settings = |candidate: Candidate| {
+        let allowed = counts.contains(&candidate.counts) || candidate.counts == Counts::DEFAULT;
+        allowed.then(|| Settings { iterations: Some(20_000), ..Settings::for_candidate(candidate) })
+    };
+    let choice = choose(View::new(&scene, &camera), settings, &Stop::default()).expect("a choice");
+    let pilot = |candidate| *choice.pilots.iter().find(|pilot| pilot.candidate == candidate).expect("a pilot");
+    let variance = |candidate| pilot(candidate).squared_error / pilot(candidate).seconds_per_iteration;
+    let compared = variance(paths) / variance(connections);
+    let measured = relative_variance(&scene, paths, SIZE) / relative_variance(&scene, connections, SIZE);
+    let settings = Settings::for_candidate(Candidate::DEFAULT);
+    let proxy = Proxy {
+        scene: &scene,
+        camera: &camera,
+        settings: &settings,
+        render_width: 8 * SIZE,
+        typical_iteration: 1,
+        candidates: &counts,
+    };
+    let predicted = proxy.measure(None, 64, &|| false).relative();
+    let predicted = predicted[0] / predicted[1];
+    println!("compared {compared:.3}, measured {measured:.3}, predicted {predicted:.3}");
+    // 3 degrees of freedom in each of 576 pixels: a standard error of about 7 %.
+    let agrees = |ratio: f64| (ratio / measured).ln().abs() < 0.3;
+    assert!(agrees(compared), "{compared} instead of {measured}");
+    assert!(!agrees(predicted), "{predicted} is as good as {compared}");
 }
