@@ -34,6 +34,12 @@ pub const LIMITS: &[Limit] = &[
         in_readme: false,
     },
     Limit {
+        name: "shadow linking",
+        sentence: "Only `path` renders shadow linking, for which `auto` chooses it.",
+        message: "does not render shadow linking",
+        in_readme: false,
+    },
+    Limit {
         name: "dispersion",
         sentence: "Only solid glass disperses light.",
         message: "its dispersion is ignored: it is no solid that refracts",

@@ -1,5 +1,5 @@
-"""Light linking (Blender 4), as keys of the scene format: which collections an object is in, and which ones receive its
-light.
+"""Light linking and shadow linking (Blender 4), as keys of the scene format: which collections an object is in, and
+which ones receive or block its light.
 
 A collection of Blender has objects that it includes and objects that it excludes; the latter become a collection of
 their own.
@@ -12,18 +12,19 @@ class Links:
     """The links of all objects of the file."""
 
     def __init__(self):
-        # {name of an object: names of its collections}, and {name of an object: the key `receivers`}
-        self._collections, self._receivers = {}, {}
+        # {name of an object: names of its collections}, and {name of an object: its keys `receivers` and `blockers`}
+        self._collections, self._linked = {}, {}
         read = {}
         for thing in bpy.data.objects:
-            collection = thing.light_linking.receiver_collection
-            if collection is not None:
-                if collection not in read:
-                    read[collection] = self._read(collection)
-                self._receivers[thing.name] = read[collection]
+            links = thing.light_linking
+            for key, collection in (("receivers", links.receiver_collection), ("blockers", links.blocker_collection)):
+                if collection is not None:
+                    if collection not in read:
+                        read[collection] = self._read(collection)
+                    self._linked.setdefault(thing.name, {})[key] = read[collection]
 
     def _read(self, collection):
-        """Note the objects of a linking collection. Returns the key `receivers`."""
+        """Note the objects of a linking collection. Returns the key `receivers` or `blockers` of its lights."""
         linked = {}
         for state, thing in _objects(collection):
             name = collection.name if state == "INCLUDE" else f"{collection.name} (excluded)"
@@ -35,7 +36,7 @@ class Links:
         """The keys of `extras.caustique` of an object. As in Cycles, the collections of its instancer count, if it has
         some, else its own."""
         own = instancer if instancer is not None and instancer.name in self._collections else thing
-        keys = {"collections": sorted(self._collections.get(own.name, ())), "receivers": self._receivers.get(thing.name)}
+        keys = {"collections": sorted(self._collections.get(own.name, ())), **self._linked.get(thing.name, {})}
         return {key: value for key, value in keys.items() if value}
 
 

@@ -329,11 +329,6 @@ class FlatScene:
             if kind not in {"NONE", "OBJECT", "COLLECTION"}:
                 what = "hair" if kind == "PATH" else f"particles that render as {kind}"
                 self._warn(where, f'{what} of particle system "{system.name}" is not carried; convert it to a mesh')
-        blockers = thing.light_linking.blocker_collection
-        if blockers is not None:
-            self._warn('light' + where[6:] if thing.type == "LIGHT" else where,
-                       f'its shadow linking (collection "{blockers.name}") is not carried: every object blocks its '
-                       "light; render the objects on view layers of their own, and compose these")
         if getattr(thing.cycles, "use_adaptive_subdivision", False):
             self._warn(where, "adaptive subdivision is not carried: the modifier's render level is taken; "
                               "raise the Subdivision modifier's Levels > Render")

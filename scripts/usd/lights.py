@@ -32,9 +32,6 @@ class Light:
             self.add_loss("inputs:shadow:enable = false is not carried: it casts shadows")
         if self.api.GetFiltersRel().GetTargets():
             self.add_loss("light filters are not carried")
-        shadows = self.api.GetShadowLinkCollectionAPI()
-        if shadows.GetIncludesRel().GetTargets() or shadows.GetExcludesRel().GetTargets():
-            self.add_loss("shadowLink is not carried: all casts shadows")
 
     def get(self, name, default):
         """The value of the light's input `name`, or `default` if it is unset."""

@@ -1,4 +1,5 @@
-"""Light linking of UsdLux as keys of `extras.caustique`: the collection `lightLink` of each light."""
+"""Light linking and shadow linking of UsdLux as keys of `extras.caustique`: the collections `lightLink` and
+`shadowLink` of each light."""
 
 from pxr import UsdLux
 
@@ -7,21 +8,23 @@ class Links:
     """The lights of a stage that are linked to some prims only."""
 
     def __init__(self, stage):
-        # {path of a light: which paths its collection contains}
-        self._members = {}
+        # {path of a light: {key of its node: (name of its collection, which paths the collection contains)}}
+        self._linked = {}
         for prim in stage.Traverse():
             if prim.HasAPI(UsdLux.LightAPI):
-                collection = UsdLux.LightAPI(prim).GetLightLinkCollectionAPI()
-                if collection.GetIncludesRel().GetTargets() or collection.GetExcludesRel().GetTargets():
-                    self._members[str(prim.GetPath())] = collection.ComputeMembershipQuery()
+                light, path = UsdLux.LightAPI(prim), str(prim.GetPath())
+                for key, name, collection in (("receivers", path, light.GetLightLinkCollectionAPI()),
+                                              ("blockers", f"{path} (shadows)", light.GetShadowLinkCollectionAPI())):
+                    if collection.GetIncludesRel().GetTargets() or collection.GetExcludesRel().GetTargets():
+                        self._linked.setdefault(path, {})[key] = name, collection.ComputeMembershipQuery()
 
     def of_mesh(self, prim):
-        """The key `collections` of a mesh's node, if it receives light of linked lights. The collections have the names of
-        the lights."""
-        names = [name for name, members in self._members.items() if members.IsPathIncluded(prim.GetPath())]
+        """The key `collections` of a mesh's node, if linked lights name it."""
+        linked = [link for links in self._linked.values() for link in links.values()]
+        names = [name for name, members in linked if members.IsPathIncluded(prim.GetPath())]
         return {"collections": names} if names else {}
 
     def of_light(self, prim):
-        """The key `receivers` of a light's node, if it is linked."""
-        name = str(prim.GetPath())
-        return {"receivers": {"include": [name]}} if name in self._members else {}
+        """The keys `receivers` and `blockers` of a light's node, if it is linked."""
+        links = self._linked.get(str(prim.GetPath()), {})
+        return {key: {"include": [name]} for key, (name, _) in links.items()}

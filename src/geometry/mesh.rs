@@ -88,7 +88,7 @@ impl PackedMesh {
     }
 }
 
-/// Bits of the linkings of lights ([`crate::light::LightLinks`]) of an object that receives the light of all lights. Bit 0 is
+/// Bits of the linkings of lights ([`crate::light::LightLinks`]) of an object that is part of all of them. Bit 0 is
 /// that of lights without linking.
 pub const ALL_LINKINGS: u64 = u64::MAX;
 
@@ -109,8 +109,8 @@ pub struct Instance {
     pub shadow_catcher: bool,
     /// Whether cameras see black without coverage where they see the instance. Other rays hit it.
     pub holdout: bool,
-    /// Linkings of lights whose light the instance receives: a bit for each ([`ALL_LINKINGS`]).
-    pub receives: u64,
+    /// Linkings of lights that the instance is part of: a bit for each ([`ALL_LINKINGS`]).
+    pub linkings: u64,
     /// Whether the place or the shape of the instance depends on the time while the shutter is open.
     pub moves: bool,
     /// Transform from local to world space; `None` if the mesh is in world space.

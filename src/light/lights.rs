@@ -10,7 +10,7 @@ use super::group::{Group, Groups};
 use super::kind::{
     Arrival, Emitter, EnvironmentLight, Light, LightRay, Owner, SceneParts, Selected, TriangleLight, VolumeLight,
 };
-use super::links::{LightLinks, Linking};
+use super::links::{LightLinks, LinkedObjects, Linking};
 use super::receiver::Receiver;
 use super::sampler::LightSampler;
 use super::sky::Sky;
@@ -121,13 +121,13 @@ impl Lights {
         Lights { groups, ..self }
     }
 
-    /// Limits the light of lights to some objects.
+    /// Limits the light and the shadows of lights to some objects.
     #[must_use]
     pub fn with_links(self, links: LightLinks) -> Lights {
         Lights { links, ..self }
     }
 
-    /// The linking of each light.
+    /// The linkings of each light.
     pub fn links(&self) -> &LightLinks {
         &self.links
     }
@@ -135,19 +135,25 @@ impl Lights {
     /// Whether a receiver receives the light of the light with index `light`, as far as light linking decides.
     #[inline]
     pub fn shines_on(&self, light: u32, receiver: &Receiver) -> bool {
-        self.links.is_empty() || self.linking(light).lights(receiver)
+        self.links.is_empty() || self.linked(light).lights(receiver)
     }
 
-    /// The linking of the light with index `light`. Media that emit light have none, as in Cycles.
+    /// The objects that block the light of the light with index `light`.
     #[inline]
-    pub fn linking(&self, light: u32) -> Linking {
+    pub fn blockers(&self, light: u32) -> Linking {
+        if self.links.is_empty() { Linking::default() } else { self.linked(light).blockers }
+    }
+
+    /// The linkings of the light with index `light`. Media that emit light have none, as in Cycles.
+    #[inline]
+    fn linked(&self, light: u32) -> LinkedObjects {
         let LightLinks { instances, others, .. } = &self.links;
-        let linking = match self.emitters[light as usize].owner() {
+        let linked = match self.emitters[light as usize].owner() {
             Owner::Surface(instance) => instances.get(instance as usize),
             Owner::Light => self.other_index(light, others.len()).and_then(|at| others.get(at)),
             Owner::Medium(_) | Owner::Environment => None,
         };
-        linking.copied().unwrap_or_default()
+        linked.copied().unwrap_or_default()
     }
 
     /// Index of a light among the `count` points, spots and suns.
@@ -266,13 +272,13 @@ impl Lights {
     }
 
     /// Calls `each(radiance, distance, light)` for every bulb on the ray from `origin` along the unit `d`, up to the
-    /// distance `reach`. The light comes from all points of the bulb along the ray; `distance` is that of one of them,
-    /// which the uniform number `u` selects. `camera`: the ray starts at the camera.
+    /// distance `reach(light)`. The light comes from all points of the bulb along the ray; `distance` is that of one of
+    /// them, which the uniform number `u` selects. `camera`: the ray starts at the camera.
     pub fn for_each_bulb(
         &self,
         origin: Vec3,
         d: Vec3,
-        reach: f32,
+        reach: impl Fn(u32) -> f32,
         camera: bool,
         u: f32,
         mut each: impl FnMut(Rgb, f32, u32),
@@ -284,7 +290,7 @@ impl Lights {
             }
             let Some(((p, radius), intensity)) = emitter.bulb_along(-d) else { continue };
             if intensity != Rgb::ZERO
-                && let Some((share, distance)) = crossed_share(p, radius, origin, d, reach, u)
+                && let Some((share, distance)) = crossed_share(p, radius, origin, d, reach(index), u)
             {
                 each(intensity * (share / (PI * radius * radius)), distance, index);
             }
@@ -356,6 +362,17 @@ impl Lights {
         self.targets.density(&self.sky, p, wi)
     }
 
+    /// Index of the light that a surface belongs to; `None` if it emits nothing.
+    #[inline]
+    pub fn surface_light(&self, surface: &Surface) -> Option<u32> {
+        let first = self.first[surface.instance as usize];
+        if first == u32::MAX {
+            return None;
+        }
+        let relative = self.relative[surface.instance as usize][surface.primitive as usize];
+        (relative != u32::MAX).then_some(first + relative)
+    }
+
     /// Radiance that a surface emits along `wo` towards the point `from`, and the densities with which a light path
     /// starts at that point of the surface along `wo`.
     #[inline]
@@ -366,15 +383,7 @@ impl Lights {
         surface: &Surface,
         wo: Vec3,
     ) -> Option<(Rgb, EmissionDensity)> {
-        let first = self.first[surface.instance as usize];
-        if first == u32::MAX {
-            return None;
-        }
-        let relative = self.relative[surface.instance as usize][surface.primitive as usize];
-        if relative == u32::MAX {
-            return None;
-        }
-        let index = (first + relative) as usize;
+        let index = self.surface_light(surface)? as usize;
         let Emitter::Triangle(triangle) = &self.emitters[index] else { return None };
         if !self.shines_on(index as u32, from) {
             return None;
@@ -388,7 +397,7 @@ impl Lights {
 
     /// Calls `each(radiance, direct, start, group)` for every light at infinity that a ray from `from` along `d`
     /// reaches when it leaves the scene, with the densities of [`EmissionDensity`] and the light group. Camera rays
-    /// skip lights that are hidden from cameras.
+    /// skip lights that are hidden from cameras, other rays those that [`Lights::for_each_linked_sun`] calls.
     #[inline]
     pub fn for_each_infinite(
         &self,
@@ -400,10 +409,25 @@ impl Lights {
         let Some(choice) = &self.choice else { return };
         for &index in self.infinite.iter() {
             if self.shines_on(index, from)
+                && (camera || self.blockers(index).is_all())
                 && let Some(light) = self.emitters[index as usize].arriving(&self.sky, from, d, camera)
             {
                 let [direct, start] = [choice.pdf(from, index as usize), choice.power().pdf(index as usize)];
                 each(light.radiance, direct * light.direct, start * light.start, self.group(index));
+            }
+        }
+    }
+
+    /// Calls `each(light, radiance, density)` for every sun with shadow linking whose disc a ray from `from` along `d`
+    /// points to: its index, its radiance, and the density with which next-event estimation samples the direction.
+    pub fn for_each_linked_sun(&self, from: &Receiver, d: Vec3, mut each: impl FnMut(u32, Rgb, f32)) {
+        let Some(choice) = &self.choice else { return };
+        for &index in self.infinite.iter() {
+            if !self.blockers(index).is_all()
+                && self.shines_on(index, from)
+                && let Some(light) = self.emitters[index as usize].arriving(&self.sky, from, d, false)
+            {
+                each(index, light.radiance, choice.pdf(from, index as usize) * light.direct);
             }
         }
     }

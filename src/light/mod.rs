@@ -37,7 +37,7 @@ pub use kind::{
     SunLight, TriangleLight, VolumeLight,
 };
 pub use lights::Lights;
-pub use links::{LightLinks, Linking, MAX_LINKINGS};
+pub use links::{LightLinks, LinkedObjects, Linking, MAX_LINKINGS};
 pub use picture::Picture;
 pub use profile::Profile;
 pub use receiver::Receiver;

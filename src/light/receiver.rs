@@ -13,7 +13,7 @@ pub struct Receiver {
     /// Whether the point is in a participating medium. Lights are then selected by power alone: points along a ray in a
     /// medium are sampled for a given light, so the light has to be selected before the point.
     pub in_medium: bool,
-    /// Linkings whose light the object of the point receives: a bit for each ([`crate::geometry::Instance::receives`]).
+    /// Linkings that the object of the point is part of: a bit for each ([`crate::geometry::Instance::linkings`]).
     pub links: u64,
 }
 

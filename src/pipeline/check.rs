@@ -28,7 +28,7 @@ pub fn check_picture(picture: &PictureRequest, path: &Path, scene: &Scene) -> Re
     let camera = scene.camera(&picture.camera)?;
     let (request, size) = (&picture.settings, camera.whole()[0]);
     let settings = match request.method.0 {
-        None if scene.survey.catchers => request.for_candidate(Candidate::CAMERA_PATHS, size),
+        None if scene.survey.needs_camera_paths() => request.for_candidate(Candidate::CAMERA_PATHS, size),
         _ => None,
     };
     let settings = settings.map_or_else(|| request.resolve(), Ok)?;
@@ -57,20 +57,22 @@ pub(super) fn check(request: &Request, scene: &Scene) -> Result<Checked> {
 /// Checks that a method can render the scene that was read from `path`.
 ///
 /// # Errors
-/// The method does not render scattering media, or the initial bandwidth does not suit the scene.
+/// The method does not render shadow catchers, shadow linking or scattering media, or the initial bandwidth does not suit
+/// the scene.
 pub fn check_settings(settings: &Settings, path: &Path, scene: &Scene) -> Result<()> {
-    if !renders_catchers(settings, scene) {
-        let cause = format!("--method {} does not render shadow catchers", settings.method.name());
+    if !follows_camera_paths(settings, scene) {
+        let what = if scene.survey.catchers { "shadow catchers" } else { "shadow linking" };
+        let cause = format!("--method {} does not render {what}", settings.method.name());
         return Err(Error::new(ErrorKind::Usage, path.display(), cause).hint("choose --method path"));
     }
     check_media(settings, path, scene)?;
     check_bandwidth(settings, path, scene)
 }
 
-/// Whether the scene has no shadow catchers, or the method renders them: other methods do not tell the light of a catcher
-/// from that of other objects.
-pub(super) fn renders_catchers(settings: &Settings, scene: &Scene) -> bool {
-    !scene.survey.catchers || settings.method.search() == Search::CameraPaths
+/// Whether the method is path tracing, or the scene does not need it. Other methods do not tell the light of a shadow
+/// catcher from that of other objects, and their light paths do not pass objects for the light of some lights.
+pub(super) fn follows_camera_paths(settings: &Settings, scene: &Scene) -> bool {
+    !scene.survey.needs_camera_paths() || settings.method.search() == Search::CameraPaths
 }
 
 /// Rejects settings whose method stores photons on surfaces only, if the scene has scattering media.

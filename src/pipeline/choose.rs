@@ -1,6 +1,6 @@
 //! The third step: the method. `auto` compares candidates.
 
-use super::check::renders_catchers;
+use super::check::follows_camera_paths;
 use super::layers;
 use super::memory::MemoryCheck;
 use super::observer::{Event, Observer, Phase, during};
@@ -51,7 +51,7 @@ pub fn choose(
     }
     let settings_of = |candidate| {
         let settings = request.for_candidate(candidate, view.camera.whole()[0]);
-        settings.filter(|settings| accepts(settings) && renders_catchers(settings, view.scene))
+        settings.filter(|settings| accepts(settings) && follows_camera_paths(settings, view.scene))
     };
     match choose::choose(view, settings_of, stop) {
         Some(choice) => {

@@ -6,8 +6,8 @@ use super::{Contacts, Scene, SolidStacks, Survey, dense, links};
 use crate::error::Result;
 use crate::geometry::{ALL_LINKINGS, Instance, Mesh, Placement, Shapes};
 use crate::light::{
-    Bulb, Distribution, Emitter, Environment, Group, Groups, ImageEnvironment, Light, LightPlacement, Lights,
-    MAX_GROUP_NAME, MAX_GROUPS, Pattern, PointLight, ShapedLight, Sky, SpotCone,
+    Bulb, Distribution, Emitter, Environment, Group, Groups, ImageEnvironment, Light, LightLinks, LightPlacement,
+    Lights, Linking, MAX_GROUP_NAME, MAX_GROUPS, Pattern, PointLight, ShapedLight, Sky, SpotCone,
 };
 use crate::material::{Alpha, Material, Materials, MediumParameters, Objects, Scattering};
 use crate::math::{DAffine3, DVec3, Rgb, Vec3, bounding_box};
@@ -44,16 +44,16 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
 
     let linked = links::resolve(&description, first_light_sphere, &mut warnings);
     let mut shapes = place_instances(&mut description, origin);
-    for (instance, &receives) in shapes.instances.iter_mut().zip(&linked.objects) {
-        instance.receives = receives;
+    for (instance, &linkings) in shapes.instances.iter_mut().zip(&linked.objects) {
+        instance.linkings = linkings;
     }
     let shapes = Arc::new(shapes);
     let mut materials = Materials { list: description.materials, textures: description.textures.into() };
     dense::limit_densities(&shapes, &mut materials, &mut description.medium, &mut warnings);
     let materials = Arc::new(materials);
     let objects = Objects { shapes: &shapes, materials: &materials };
-    let (tracer, pass_through_lights) = tracers(&shapes, &materials, threads)?;
-    let catchers = catchers(&shapes, &materials, threads)?;
+    let (tracer, pass_through_lights) = tracers(&shapes, &materials, &linked.lights, threads)?;
+    let catchers = catchers(&shapes, &materials, &linked.lights, threads)?;
     // The picture is laid over a photograph.
     description.picture.film_transparent |= catchers.is_some();
 
@@ -273,9 +273,9 @@ pub(super) fn rebuild_with_materials(
     };
     let (tracer, pass_through_lights) = match traced(&materials) == traced(&scene.materials) {
         true => (scene.tracer.clone(), scene.pass_through_lights.clone()),
-        false => tracers(&shapes, &materials, rayon::current_num_threads())?,
+        false => tracers(&shapes, &materials, scene.lights.links(), rayon::current_num_threads())?,
     };
-    let catchers = catchers(&shapes, &materials, rayon::current_num_threads())?;
+    let catchers = catchers(&shapes, &materials, scene.lights.links(), rayon::current_num_threads())?;
     let others = scene.lights.others().cloned();
     let sky = Sky { environment, ..scene.lights.sky().clone() };
     let lights = Lights::new(objects, others.collect(), sky).with_groups(scene.lights.groups().clone());
@@ -348,7 +348,7 @@ fn place_instances(description: &mut Description, origin: DVec3) -> Shapes {
             hidden_from_camera: placed.hidden_from_camera,
             shadow_catcher: placed.shadow_catcher,
             holdout: placed.holdout,
-            receives: ALL_LINKINGS,
+            linkings: ALL_LINKINGS,
             moves: placed.moves,
             to_world: shared.then(|| placement(&to_world)),
         });
@@ -389,40 +389,51 @@ pub(super) fn hit_behaviour(material: &Material) -> (Alpha, bool, bool) {
     (material.alpha_per_hit(), material.null_bsdf, material.is_solid())
 }
 
-/// Commits the shapes to Embree. Returns an Embree scene of all shapes except lights that all rays pass through, and
-/// one of these pass-through lights, if there are any.
+/// Commits the shapes to Embree. Returns the scenes of [`Scene::tracer`] and of [`Scene::pass_through_lights`].
 pub(super) fn tracers(
     shapes: &Arc<Shapes>,
     materials: &Arc<Materials>,
+    links: &LightLinks,
     threads: usize,
 ) -> Result<(Tracer, Option<Tracer>)> {
-    let filter = hit_filter(shapes, materials);
-    let build = |passed| Tracer::build(shapes, &filtered(shapes, materials, passed), &filter, threads);
-    let passed = |instance: &Instance| materials.list[instance.material as usize].null_bsdf;
-    let has_pass_through = shapes.instances.iter().any(passed);
-    Ok((build(false)?, has_pass_through.then(|| build(true)).transpose()?))
+    let (objects, filter) = (Objects { shapes, materials }, hit_filter(shapes, materials, links));
+    let build = |filtered: &[Option<bool>]| Tracer::build(shapes, filtered, &filter, threads);
+    let [surfaces, lights] = [false, true].map(|lights| filtered(objects, links, lights));
+    let has_lights = lights.iter().any(Option::is_some);
+    Ok((build(&surfaces)?, has_lights.then(|| build(&lights)).transpose()?))
 }
 
 /// An Embree scene of the shadow catchers; `None` if there are none.
-pub(super) fn catchers(shapes: &Arc<Shapes>, materials: &Arc<Materials>, threads: usize) -> Result<Option<Tracer>> {
+pub(super) fn catchers(
+    shapes: &Arc<Shapes>,
+    materials: &Arc<Materials>,
+    links: &LightLinks,
+    threads: usize,
+) -> Result<Option<Tracer>> {
     if !shapes.instances.iter().any(|instance| instance.shadow_catcher) {
         return Ok(None);
     }
-    let all = filtered(shapes, materials, false);
+    let all = filtered(Objects { shapes, materials }, links, false);
     let chosen: Vec<Option<bool>> =
         shapes.instances.iter().zip(all).map(|(instance, of)| of.filter(|_| instance.shadow_catcher)).collect();
-    Tracer::build(shapes, &chosen, &hit_filter(shapes, materials), threads).map(Some)
+    Tracer::build(shapes, &chosen, &hit_filter(shapes, materials, links), threads).map(Some)
 }
 
-/// For each instance, whether its hits are filtered; `None` for instances that are not lights that all rays pass through,
-/// if `null_bsdf`, and otherwise for those lights.
-pub(super) fn filtered(shapes: &Shapes, materials: &Materials, null_bsdf: bool) -> Vec<Option<bool>> {
-    let filtered = |instance: &Instance| {
-        let material = &materials.list[instance.material as usize];
-        let filtered = instance.hidden_from_camera || material.alpha_per_hit() != Alpha::Opaque;
-        (material.null_bsdf == null_bsdf).then_some(filtered)
+/// For each instance, whether its hits are filtered; `None` for instances that are not in
+/// [`Scene::pass_through_lights`], if `lights`, and otherwise for those that are not in [`Scene::tracer`].
+pub(super) fn filtered(objects: Objects<'_>, links: &LightLinks, lights: bool) -> Vec<Option<bool>> {
+    let blockers = links.blockers();
+    let filtered = |(index, instance): (usize, &Instance)| {
+        let material = objects.material(instance);
+        let unlinked = blockers & !instance.linkings != 0;
+        let filtered = instance.hidden_from_camera || unlinked || material.alpha_per_hit() != Alpha::Opaque;
+        let chosen = match lights {
+            true => material.null_bsdf || !links.blockers_of(index as u32).is_all(),
+            false => !material.null_bsdf,
+        };
+        chosen.then_some(filtered)
     };
-    shapes.instances.iter().map(filtered).collect()
+    objects.shapes.instances.iter().enumerate().map(filtered).collect()
 }
 
 /// A random number in (0, 1] that depends on the ray's token, the instance and `key` alone.
@@ -431,14 +442,19 @@ pub(super) fn random_cutoff(token: u32, instance: u32, key: u32) -> f32 {
     (crate::random::mix(key) >> 40) as f32 * (1.0 / 16_777_216.0) + f32::MIN_POSITIVE
 }
 
-/// The filter of Embree's hits: rejects hits of camera rays on instances hidden from cameras, and hits on surfaces that
-/// the ray passes because of alpha. Camera rays hit hidden solids, because they keep track of the solids around them.
-pub(super) fn hit_filter(shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> HitFilter {
+/// The filter of Embree's hits: rejects hits of camera rays on instances hidden from cameras, of shadow rays on
+/// instances that do not block their light, and hits on surfaces that the ray passes because of alpha. These rays hit
+/// solids all the same, because they keep track of the solids around them.
+pub(super) fn hit_filter(shapes: &Arc<Shapes>, materials: &Arc<Materials>, links: &LightLinks) -> HitFilter {
     let (shapes, materials) = (Arc::clone(shapes), Arc::clone(materials));
+    let linked = links.blockers() != 0;
     Arc::new(move |instance, primitive, barycentric, token| {
         let placed = &shapes.instances[instance as usize];
         let material = &materials.list[placed.material as usize];
         if placed.hidden_from_camera && token & CAMERA_RAY_BIT != 0 && !material.is_solid() {
+            return false;
+        }
+        if linked && !Linking::of_ray(token).has(placed.linkings) && !material.is_solid() {
             return false;
         }
         let cutoff = match material.alpha_per_hit() {

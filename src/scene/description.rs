@@ -143,7 +143,7 @@ pub struct PlacedMesh {
     pub holdout: bool,
     /// Name of the light group (a named set of lights with a layer of its own) of the instance, if it is emissive.
     pub light_group: Option<String>,
-    /// Collections of the instance, and those that receive its light; `None` if there are none.
+    /// Collections of the instance, and those that receive or block its light; `None` if there are none.
     pub links: Option<Arc<Links>>,
     /// Whether the place or the shape of the instance depends on the time while the shutter is open.
     pub moves: bool,
@@ -151,13 +151,15 @@ pub struct PlacedMesh {
     pub to_world: DAffine3,
 }
 
-/// Light linking of a node.
+/// Light linking and shadow linking of a node.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Links {
     /// Names of the collections that the node is in.
     pub collections: Vec<String>,
     /// Collections that receive the light of the node.
     pub receivers: Linked,
+    /// Collections that block the light of the node.
+    pub blockers: Linked,
 }
 
 /// Objects that a light is linked to, by the names of their collections.
@@ -325,7 +327,7 @@ pub struct PunctualLight {
     pub hidden_from_camera: bool,
     /// Name of the light's group (a named set of lights with a layer of its own), if it has one.
     pub light_group: Option<String>,
-    /// Collections that receive its light; `None` if all objects do.
+    /// Collections that receive or block its light; `None` if all objects do.
     pub links: Option<Arc<Links>>,
 }
 

@@ -1,14 +1,14 @@
-//! Resolves light linking, which a scene file gives by collections of nodes, to bits of objects.
+//! Resolves light linking and shadow linking, which a scene file gives by collections of nodes, to bits of objects.
 
 use super::description::{Description, Linked, Links, PlacedMesh};
-use crate::light::{LightLinks, Linking, MAX_LINKINGS};
+use crate::light::{LightLinks, LinkedObjects, Linking, MAX_LINKINGS};
 use std::collections::HashSet;
 
-/// Light linking of all objects and lights.
+/// Light linking and shadow linking of all objects and lights.
 pub(super) struct Resolved {
-    /// For each instance, the bits of the linkings whose light it receives.
+    /// For each instance, the bits of the linkings that it is part of.
     pub objects: Vec<u64>,
-    /// The linking of each light.
+    /// The linkings of each light.
     pub lights: LightLinks,
 }
 
@@ -40,14 +40,19 @@ impl<'d> Linkings<'d> {
 }
 
 /// Resolves the links of a description. Objects from `first_light_sphere` on are spheres made for point lights.
-pub(super) fn resolve(description: &Description, first_light_sphere: u32, warnings: &mut Vec<String>) -> Resolved {
+pub(super) fn resolve<'d>(
+    description: &'d Description,
+    first_light_sphere: u32,
+    warnings: &mut Vec<String>,
+) -> Resolved {
     let Description { instances, lights, materials, .. } = description;
     let glows =
         |placed: &PlacedMesh| placed.object >= first_light_sphere || materials[placed.material as usize].emits();
     let surfaces = instances.iter().map(|placed| (&placed.name, placed.links.as_deref().filter(|_| glows(placed))));
     let others = lights.iter().filter(|light| !light.is_sphere()).map(|light| (&light.name, light.links.as_deref()));
     let sources = surfaces.chain(others);
-    if sources.clone().all(|(_, links)| links.is_none_or(|links| links.receivers.is_all())) {
+    let unlinked = |links: &Links| links.receivers.is_all() && links.blockers.is_all();
+    if sources.clone().all(|(_, links)| links.is_none_or(unlinked)) {
         return Resolved { objects: Vec::new(), lights: LightLinks::default() };
     }
     let known: HashSet<&str> = instances
@@ -61,30 +66,35 @@ pub(super) fn resolve(description: &Description, first_light_sphere: u32, warnin
             warnings.push(warning);
         }
     };
-    let of_lights: Vec<Linking> = sources
-        .map(|(name, links)| {
-            let Some(Links { receivers, .. }) = links else { return Linking::default() };
-            for missing in receivers.include.iter().chain(&receivers.exclude) {
-                if !known.contains(&**missing) {
-                    warn(format!(
-                        "light \"{name}\": its linking names the collection \"{missing}\", in which no object is (add \
-                         the name to \"collections\" of its objects)"
-                    ));
-                }
-            }
-            Linking(linkings.bit(receivers).unwrap_or_else(|| {
+    let mut resolve = |name: &String, linked: &'d Linked| {
+        for missing in linked.include.iter().chain(&linked.exclude) {
+            if !known.contains(&**missing) {
                 warn(format!(
-                    "light \"{name}\": its linking is left out, because there are {MAX_LINKINGS} others (link more \
-                     lights to the same collections)"
+                    "light \"{name}\": its linking names the collection \"{missing}\", in which no object is (add \
+                     the name to \"collections\" of its objects)"
                 ));
-                0
-            }))
+            }
+        }
+        Linking(linkings.bit(linked).unwrap_or_else(|| {
+            warn(format!(
+                "light \"{name}\": its linking is left out, because there are {MAX_LINKINGS} others (link more \
+                 lights to the same collections)"
+            ));
+            0
+        }))
+    };
+    let of_lights: Vec<LinkedObjects> = sources
+        .map(|(name, links)| {
+            links.map_or_else(LinkedObjects::default, |Links { receivers, blockers, .. }| LinkedObjects {
+                receivers: resolve(name, receivers),
+                blockers: resolve(name, blockers),
+            })
         })
         .collect();
     let objects =
         instances.iter().map(|placed| linkings.bits(placed.links.as_ref().map_or(&[], |links| &links.collections)));
-    let (objects, medium_receives) = (objects.collect(), linkings.bits(&[]));
+    let (objects, medium_linkings) = (objects.collect(), linkings.bits(&[]));
     let (surfaces, others) = of_lights.split_at(instances.len());
-    let lights = LightLinks { instances: surfaces.to_vec(), others: others.to_vec(), medium_receives };
+    let lights = LightLinks { instances: surfaces.to_vec(), others: others.to_vec(), medium_linkings };
     Resolved { objects, lights }
 }

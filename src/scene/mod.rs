@@ -66,7 +66,9 @@ pub struct Scene {
     pub preset_floor: Option<u32>,
     /// Embree scene of all shapes except lights that rays pass through.
     pub tracer: Tracer,
-    /// Embree scene of the lights that rays pass through ([`crate::material::Material::null_bsdf`]), if there are any.
+    /// Embree scene of the lights whose light camera paths meet beside surfaces, if there are any: those that rays pass
+    /// through ([`crate::material::Material::null_bsdf`]), and glowing objects with shadow linking, whose light passes
+    /// objects.
     pub pass_through_lights: Option<Tracer>,
     /// Embree scene of the shadow catchers, which alone block the light of [`crate::transport`]'s unshadowed rays; `None`
     /// if there are none.
@@ -159,13 +161,18 @@ impl Scene {
         self.survey.culled && self.materials.list[surface.material as usize].culled && direction.dot(surface.ng) > 0.0
     }
 
-    /// Linkings whose light the instance (object) receives ([`crate::geometry::Instance::receives`]).
+    /// Linkings that the instance (object) is part of ([`crate::geometry::Instance::linkings`]).
     #[inline]
-    pub fn receives(&self, instance: u32) -> u64 {
+    pub fn linkings(&self, instance: u32) -> u64 {
         if self.lights.links().is_empty() {
             return ALL_LINKINGS;
         }
-        self.shapes.instances[instance as usize].receives
+        self.shapes.instances[instance as usize].linkings
+    }
+
+    /// Whether all rays pass through an instance, which is a light.
+    pub fn passes(&self, instance: u32) -> bool {
+        self.materials.list[self.shapes.instances[instance as usize].material as usize].null_bsdf
     }
 
     /// The name of a light in messages: `light "Sun"`, or `object "Panel"` for an emissive triangle or

@@ -82,7 +82,7 @@ impl<'a> MomentBuilder<'a> {
             && !self.moves_emitters(objects);
         let lights = scene.lights.at_moment(objects, others, sky, !same_lights);
         let (tracer, pass_through_lights) = self.tracers(&shapes, &materials)?;
-        let catchers = build::catchers(&shapes, &materials, rayon::current_num_threads())?;
+        let catchers = build::catchers(&shapes, &materials, lights.links(), rayon::current_num_threads())?;
         Ok(Scene {
             source: scene.source.clone(),
             files: scene.files.clone(),
@@ -232,18 +232,18 @@ impl<'a> MomentBuilder<'a> {
         moving.into_iter().any(|(now, before)| differs(now, before))
     }
 
-    /// Commits the moving instances to Embree: those of the scene, and those of lights that all rays pass through.
+    /// Commits the moving instances to Embree: those of [`Scene::tracer`], and those of [`Scene::pass_through_lights`].
     fn tracers(&self, shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> Result<(Tracer, Option<Tracer>)> {
-        let scene = self.scene;
-        let filtered = |passed| build::filtered(shapes, materials, passed);
+        let (scene, links) = (self.scene, self.scene.lights.links());
+        let filtered = |passed| build::filtered(Objects { shapes, materials }, links, passed);
         // Embree's filters keep the materials that they were built with.
         let unfiltered = || [false, true].iter().all(|&passed| !filtered(passed).contains(&Some(true)));
         let behaviour = |materials: &Materials| materials.list.iter().map(build::hit_behaviour).collect::<Vec<_>>();
         let same = || behaviour(materials) == behaviour(&scene.materials) && unfiltered();
         if !(Arc::ptr_eq(materials, &scene.materials) || same()) {
-            return build::tracers(shapes, materials, rayon::current_num_threads());
+            return build::tracers(shapes, materials, links, rayon::current_num_threads());
         }
-        let filter = build::hit_filter(shapes, materials);
+        let filter = build::hit_filter(shapes, materials, links);
         let at = |tracer: &Tracer, passed| tracer.at_moment(&scene.shapes, shapes, &filtered(passed), &filter);
         let pass_through = scene.pass_through_lights.as_ref().map(|tracer| at(tracer, true)).transpose()?;
         Ok((at(&scene.tracer, false)?, pass_through))

@@ -39,6 +39,10 @@ pub struct Survey {
     pub delta_lights: bool,
     /// Whether some light is at infinity.
     pub infinite_lights: bool,
+    /// Whether only some objects block the light of some light.
+    pub shadow_links: bool,
+    /// Whether some solid does not block the light of some light.
+    pub unlinked_solids: bool,
     /// Whether some instance is a shadow catcher.
     pub catchers: bool,
     /// Whether some instance is a holdout.
@@ -52,15 +56,22 @@ impl Survey {
     /// at one of its ends.
     #[inline]
     pub fn shadow_rays_end_at_surfaces(&self) -> bool {
-        !(self.media || self.null_boundaries || self.culled || self.hidden_solids)
+        !(self.media || self.null_boundaries || self.culled || self.hidden_solids || self.unlinked_solids)
+    }
+
+    /// Whether only path tracing renders the scene.
+    pub fn needs_camera_paths(&self) -> bool {
+        self.catchers || self.shadow_links
     }
 
     /// Finds out which kinds of things a scene contains.
     pub fn new(objects: Objects<'_>, lights: &Lights, medium: Option<MediumParameters>) -> Survey {
         let scatters = |medium: &Option<MediumParameters>| medium.is_some_and(|medium| medium.scatters());
+        let blockers = lights.links().blockers();
         let mut survey = Survey {
             media: medium.is_some(),
             scattering: scatters(&medium),
+            shadow_links: blockers != 0,
             environment: lights.sky().environment.is_some() && !lights.sky().hidden_from_camera,
             ..Survey::default()
         };
@@ -69,6 +80,7 @@ impl Survey {
             uses[instance.material as usize] += 1;
             survey.hidden_from_camera |= instance.hidden_from_camera;
             survey.hidden_solids |= instance.hidden_from_camera && objects.material(instance).is_solid();
+            survey.unlinked_solids |= blockers & !instance.linkings != 0 && objects.material(instance).is_solid();
             survey.catchers |= instance.shadow_catcher;
             survey.holdouts |= instance.holdout;
         }

@@ -2,4 +2,4 @@
 
 mod tracer;
 
-pub use tracer::{CAMERA_RAY_BIT, Hit, HitFilter, Ray, Tracer, library, origin};
+pub use tracer::{CAMERA_RAY_BIT, Hit, HitFilter, LINKING_BITS, LINKING_SHIFT, Ray, Tracer, library, origin};

@@ -18,12 +18,20 @@ pub struct Ray {
     /// Largest t of the segment (m); may be infinite.
     pub tmax: f32,
     /// Random bits for the alpha cut-outs along this ray. In scenes with objects that are hidden from cameras,
-    /// [`CAMERA_RAY_BIT`] is set in camera rays and cleared in others.
+    /// [`CAMERA_RAY_BIT`] is set in camera rays and cleared in others. In scenes with shadow linking, [`LINKING_BITS`]
+    /// hold the linking of the objects that block the ray.
     pub token: u32,
 }
 
 /// Bit of [`Ray::token`] that marks rays from or to the camera. They pass objects that are hidden from cameras.
 pub const CAMERA_RAY_BIT: u32 = 1;
+
+/// Position of [`LINKING_BITS`] in [`Ray::token`].
+pub const LINKING_SHIFT: u32 = 1;
+
+/// Bits of [`Ray::token`] that hold a linking ([`crate::light::Linking`]): only the objects that are part of it block
+/// the ray. 0: all objects do.
+pub const LINKING_BITS: u32 = 0x3f << LINKING_SHIFT;
 
 /// The nearest triangle along a ray.
 #[derive(Clone, Copy, Debug)]
@@ -38,8 +46,9 @@ pub struct Hit {
     pub primitive: u32,
 }
 
-/// Decides whether a hit counts, for alpha cut-outs and objects that are hidden from cameras. Arguments: instance,
-/// primitive, barycentric weights of the second and third corner, token of the ray. Must be a pure function.
+/// Decides whether a hit counts, for alpha cut-outs, objects that are hidden from cameras, and objects that do not
+/// block the light of a shadow ray. Arguments: instance, primitive, barycentric weights of the second and third corner,
+/// token of the ray. Must be a pure function.
 pub type HitFilter = Arc<dyn Fn(u32, u32, [f32; 2], u32) -> bool + Send + Sync>;
 
 /// If all instances of a mesh together have at most this number of triangles, they are copied into the BVH of the

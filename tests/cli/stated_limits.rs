@@ -30,6 +30,14 @@ fn said(name: &str, plain: bool) -> String {
         "catchers" => with("plan scene.glb --method vcm", |document| {
             document["nodes"][0]["extras"] = json!({"caustique": {"shadow_catcher": true}});
         }),
+        "shadow linking" => with("plan scene.glb --method vcm", |document| {
+            document["nodes"][0]["extras"] = json!({"caustique": {"collections": ["things"]}});
+            for node in document["nodes"].as_array_mut().expect("a list") {
+                if node.get("extensions").is_some() {
+                    node["extras"] = json!({"caustique": {"blockers": {"exclude": ["things"]}}});
+                }
+            }
+        }),
         "dispersion" => with("plan scene.glb --method path", |document| {
             document["extensionsUsed"].as_array_mut().expect("a list").push("KHR_materials_dispersion".into());
             document["materials"][0]["extensions"] = json!({"KHR_materials_dispersion": {"dispersion": 1}});

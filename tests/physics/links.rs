@@ -1,4 +1,5 @@
-//! Light linking: lights that shine on some objects only, by all methods.
+//! Light linking: lights that shine on some objects only, by all methods; and shadow linking: lights that only some
+//! objects block, by path tracing.
 //!
 //! The closed form is checked by t tests over independent seeds at a family-wise error rate of 0.1 % (Sidak); besides
 //! noise they allow for the error of kernels where photons are gathered (3 %). Every check must reject a picture that is
@@ -9,10 +10,12 @@ use crate::support;
 use caustique::geometry::Mesh;
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec3};
+use caustique::pipeline::check::check_settings;
 use caustique::render::{Control, InitialBandwidth, Levels, Method, Settings, render};
 use caustique::scene::Scene;
 use caustique::scene::description::{Description, Linked, Links, PunctualKind, PunctualLight};
 use std::f64::consts::PI;
+use std::path::Path;
 use std::sync::Arc;
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 use support::stats::{mean_and_error, sidak, t_critical};
@@ -33,6 +36,12 @@ fn receivers(include: &[&str], exclude: &[&str]) -> Option<Arc<Links>> {
     let names = |names: &[&str]| names.iter().map(|&name| name.into()).collect();
     let receivers = Linked { include: names(include), exclude: names(exclude) };
     Some(Arc::new(Links { receivers, ..Links::default() }))
+}
+
+/// The objects in these collections do not block the light of a light.
+fn passed(exclude: &[&str]) -> Option<Arc<Links>> {
+    let receivers = receivers(&[], exclude)?.receivers.clone();
+    Some(Arc::new(Links { blockers: receivers, ..Links::default() }))
 }
 
 fn settings(method: Method) -> Settings {
@@ -182,5 +191,135 @@ fn pictures_of_single_receivers_sum_to_the_whole() {
             println!("{method:?}, {name}: {:.3}", sum / (scale * whole.len() as f64));
             assert!(sum > 0.0, "{method:?}: nothing receives light on the {name}");
         }
+    }
+}
+
+/// A floor below a light of one kind, which is at a height of 2. The camera sees the floor below the screens that
+/// `screens` adds at heights around 1.
+fn screened(floor: Material, kind: &str, links: Option<Arc<Links>>, screens: impl Fn(&mut Description)) -> Scene {
+    let mut scene = Description::default();
+    put(&mut scene, "floor", quad(Vec3::new(-3.0, 0.0, -3.0), Vec3::Z * 6.0, Vec3::X * 6.0), floor);
+    // The middle of the picture shows it in a mirror.
+    let at = DVec3::new(0.3, 2.0, -10.0 / 3.0);
+    match kind {
+        "panel" => {
+            put(&mut scene, kind, quad(at.as_vec3() - Vec3::new(0.5, 0.0, 0.5), Vec3::X, Vec3::Z), matte(0.0, 4.0));
+            let panel = scene.instances.last_mut().expect("the instance was added");
+            let own = Links { collections: vec![kind.into()], ..Links::default() };
+            panel.links =
+                Some(links.map_or(own.clone(), |links| Links { blockers: links.blockers.clone(), ..own }).into());
+        }
+        _ => {
+            let edge = caustique::light::SpotEdge::default();
+            let (kind, radius) = match kind {
+                "sun" => (PunctualKind::Sun { angle: 0.3 }, 0.0),
+                "spot" => (PunctualKind::Spot { inner: 0.5, outer: 0.7, edge }, 0.2),
+                "ball" => (PunctualKind::Point, 0.3),
+                _ => (PunctualKind::Point, 0.0),
+            };
+            let bulb = matches!(kind, PunctualKind::Spot { .. });
+            let mut light = PunctualLight { kind, radius, bulb, pass_through: true, links, ..point_light(at, 4.0) };
+            light.to_world.matrix3 = glam::DMat3::from_rotation_x(-0.828 * PI);
+            scene.lights.push(light);
+        }
+    }
+    screens(&mut scene);
+    scene.cameras.push(look_at(DVec3::new(0.3, 0.6, 1.0), DVec3::new(0.3, 0.0, 0.0), 0.5 * VIEW));
+    build(scene)
+}
+
+/// Screens of every kind that a shadow ray may cross: an opaque one, glass with another glass inside, and fog.
+fn add_screens(scene: &mut Description) {
+    put(scene, "screen", quad(Vec3::new(-8.0, 0.8, -8.0), Vec3::Z * 16.0, Vec3::X * 16.0), matte(0.8, 0.0));
+    let slab = |low: f32, high: f32| cuboid(Vec3::new(-7.0, low, -7.0), Vec3::new(7.0, high, 7.0), false);
+    put(scene, "screen", slab(0.9, 1.2), glass(1.5));
+    put(scene, "screen", slab(1.0, 1.1), glass(1.3));
+    let medium = MediumParameters { sigma_a: Rgb::splat(2.0), sigma_s: Rgb::splat(3.0), g: 0.3 };
+    put(scene, "screen", slab(1.3, 1.6), Material { medium: Some(medium), ..glass(1.0) });
+}
+
+/// Screens that do not block the light of a light leave no trace in the light on the floor, in every pixel of the same
+/// random numbers, whether next-event estimation or a ray from a glossy floor or a mirror finds the light. Screens that
+/// block it make the floor dark.
+#[test]
+fn objects_that_do_not_block_a_light_do_not_exist_for_it() {
+    let settings = Settings { max_depth: 2, iterations: Some(64), ..settings(Method::Path) };
+    let glossy = Material { roughness: 0.2.into(), ..mirror() };
+    let fog = Material {
+        medium: Some(MediumParameters { sigma_a: Rgb::ZERO, sigma_s: Rgb::splat(2.0), g: 0.5 }),
+        ..glass(1.0)
+    };
+    for (name, floor) in [("matte", matte(0.5, 0.0)), ("glossy", glossy), ("mirror", mirror()), ("fog", fog)] {
+        for kind in ["point", "ball", "sun", "spot", "panel"] {
+            let add: fn(&mut Description) = match name {
+                // The medium reaches up to the first screen.
+                "fog" => |scene| {
+                    let cube = cuboid(Vec3::new(-3.0, 0.0, -3.0), Vec3::new(3.0, 0.7, 3.0), false);
+                    (scene.meshes[0], scene.instances[0].name) = (cube.into(), "cube".into());
+                },
+                _ => |_| (),
+            };
+            let picture = |links, screens: bool| {
+                let scene = screened(floor.clone(), kind, links, |scene| {
+                    add(scene);
+                    if screens {
+                        add_screens(scene);
+                    }
+                });
+                picture(&scene, &settings, 8)
+            };
+            let [open, linked, blocked] =
+                [picture(None, false), picture(passed(&["screen", kind]), true), picture(None, true)];
+            let sum = |picture: &[DVec3]| picture.iter().map(|pixel| pixel.y).sum::<f64>();
+            println!("{name}, {kind}: {} {} {}", sum(&open), sum(&linked), sum(&blocked));
+            // A mirror shows no point.
+            assert_eq!(sum(&open) > 0.0, (name, kind) != ("mirror", "point"), "{name}, {kind}: the floor");
+            assert_eq!(sum(&blocked), 0.0, "{name}, {kind}: light passes screens that block it");
+            // A ray that finds the light in fog is a random collision where the light is an object, but not with linking.
+            if name == "fog" {
+                let ratio = sum(&linked) / sum(&open);
+                assert!((ratio - 1.0).abs() < 0.03, "{kind}: {ratio} in fog");
+                continue;
+            }
+            let scale = sum(&open) / open.len() as f64;
+            for (index, (open, linked)) in open.iter().zip(&linked).enumerate() {
+                let what = format!("{name}, {kind}, pixel {index}: {linked} instead of {open}");
+                assert!((*open - *linked).abs().max_element() <= 1e-3 * (open.max_element() + scale), "{what}");
+            }
+        }
+    }
+}
+
+/// An object that does not block the light of a light receives it all the same, and lights other objects.
+#[test]
+fn objects_that_do_not_block_a_light_receive_it() {
+    let lit = |links| {
+        let scene = screened(matte(0.0, 0.0), "panel", links, |scene| {
+            put(scene, "screen", quad(Vec3::new(-3.0, 0.8, -3.0), Vec3::Z * 6.0, Vec3::X * 6.0), matte(0.8, 0.0));
+            scene.cameras.insert(0, look_at(DVec3::new(0.3, 1.4, 1.0), DVec3::new(0.3, 0.8, 0.0), VIEW));
+        });
+        picture(&scene, &Settings { iterations: Some(64), ..settings(Method::Path) }, 8)
+    };
+    let [whole, linked] = [lit(None), lit(passed(&["screen"]))];
+    let sum = |picture: &[DVec3]| picture.iter().map(|pixel| pixel.y).sum::<f64>();
+    assert!(sum(&whole) > 0.0 && (sum(&linked) / sum(&whole) - 1.0).abs() < 1e-3, "{} {}", sum(&whole), sum(&linked));
+}
+
+/// Methods with light paths refuse shadow linking, and name the method that renders it.
+#[test]
+fn other_methods_refuse_shadow_linking() {
+    let scene = |links| screened(matte(0.5, 0.0), "ball", links, |_| ());
+    let check = |method, scene: &Scene| check_settings(&settings(method), Path::new("scene.glb"), scene);
+    for &method in Method::ALL {
+        let refused = check(method, &scene(passed(&["floor"])));
+        match method {
+            Method::Path => refused.expect("path renders it"),
+            _ => {
+                let error = refused.expect_err("it is refused");
+                assert!(error.cause.contains("does not render shadow linking"), "{error}");
+                assert_eq!(error.hint.as_deref(), Some("choose --method path"));
+            }
+        }
+        assert!(check(method, &scene(None)).is_ok(), "{method:?}");
     }
 }

@@ -186,12 +186,10 @@ class Geometry(cycles_comparison.CyclesComparison):
         self.silhouettes_agree(self.caustique(16), self.cycles(16))
 
     def test_losses_are_named(self):
-        """Hair, shadow linking, and nodes that act only in the viewport."""
+        """Hair, and nodes that act only in the viewport."""
         hair = bpy.data.hair_curves.new("hair")
         hair.add_curves([4])
         self.put("hair", 0, 0, None, hair)
-        linked = self.put("linked", 1, 0, (1, 0, 0))
-        linked.light_linking.blocker_collection = self.collection("receivers")
         nodes = self.put("nodes", 3, 0, (0, 0, 0))
         self.instance_on_points(nodes, None, glow("made by nodes", (1, 1, 0)))
         nodes.modifiers[0].node_group.nodes.new("GeometryNodeIsViewport")
@@ -199,8 +197,8 @@ class Geometry(cycles_comparison.CyclesComparison):
         gone.hide_render = True
         self.look(6)
         warnings = export.write(self.path)
-        self.assertEqual(len(warnings), 3, warnings)
-        for what, said in zip(('"hair": hair curves are', '"linked": its shadow linking', '"nodes": its modifier "nodes" has an '
+        self.assertEqual(len(warnings), 2, warnings)
+        for what, said in zip(('"hair": hair curves are', '"nodes": its modifier "nodes" has an '
                                'Is Viewport node'), sorted(warnings)):
             self.assertIn("object " + what, said)
 

@@ -53,6 +53,15 @@ class Irradiance(usd_support.Stages):
         UsdLux.LightAPI(other.GetPrim()).GetLightLinkCollectionAPI().CreateExcludesRel().SetTargets(["/Floor"])
         self.check(3 * math.pi * (0.25 / HEIGHT) ** 2)
 
+    def test_shadow_linking(self):
+        """Only the prims of its collection shadowLink block the light of a light."""
+        light = self.light("SphereLight", matrix=down(HEIGHT), radius=0.25, intensity=3.0)
+        UsdLux.LightAPI(light.GetPrim()).GetShadowLinkCollectionAPI().CreateExcludesRel().SetTargets(["/Screen"])
+        self.light("SphereLight", "/Other", matrix=down(HEIGHT), radius=0.25, intensity=1.0)
+        corners = [(-1, HEIGHT / 2, 1), (1, HEIGHT / 2, 1), (1, HEIGHT / 2, -1), (-1, HEIGHT / 2, -1)]
+        self.mesh("/Screen", corners, [4], [0, 1, 2, 3]).CreateDisplayColorAttr([Gf.Vec3f(0)])
+        self.check(3 * math.pi * (0.25 / HEIGHT) ** 2)
+
     def test_sphere_normalized_and_scaled(self):
         scale = Gf.Matrix4d().SetScale(2.0)
         self.light("SphereLight", matrix=scale * down(HEIGHT), radius=0.1, intensity=30.0, normalize=True, exposure=1.0)

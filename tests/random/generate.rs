@@ -16,6 +16,8 @@ const CAMERA_SPACE: f64 = 0.08;
 const FIRST_WITH_ADDITIONS: u64 = 2000;
 /// First seed of scenes with light linking.
 const FIRST_WITH_LINKS: u64 = 3000;
+/// First seed of scenes with shadow linking.
+const FIRST_WITH_SHADOW_LINKS: u64 = 5000;
 /// Number of attempts to find a place for a thing.
 const ATTEMPTS: usize = 40;
 
@@ -48,7 +50,10 @@ pub fn generate(seed: u64) -> World {
         let own = std::mem::replace(&mut generator.random, Random::new(seed ^ 0x5ca1e));
         generator.rare();
         if seed >= FIRST_WITH_LINKS && generator.random.chance(0.3) {
-            generator.link();
+            generator.link(|thing| &mut thing.unlit);
+        }
+        if seed >= FIRST_WITH_SHADOW_LINKS && generator.random.chance(0.3) {
+            generator.link(|thing| &mut thing.unblocked);
         }
         generator.random = own;
     }
@@ -478,8 +483,8 @@ impl Generator {
         }
     }
 
-    /// Lets some lights shine on some bodies only.
-    fn link(&mut self) {
+    /// Links some lights to some bodies only, by a list of those that they are not linked to.
+    fn link(&mut self, list: fn(&mut Thing) -> &mut Vec<u32>) {
         let mut bodies: Vec<u32> = self.world.things.iter().filter(|t| t.mesh().is_some()).map(|t| t.body).collect();
         bodies.sort_unstable();
         bodies.dedup();
@@ -487,8 +492,8 @@ impl Generator {
             let thing = &self.world.things[index];
             let shines = matches!(thing.kind, ThingKind::Light(_));
             if shines || self.world.matter(thing).is_some_and(|matter| matter.glows()) {
-                let unlit = bodies.iter().copied().filter(|_| self.random.chance(0.4)).collect();
-                self.world.things[index].unlit = unlit;
+                let unlinked = bodies.iter().copied().filter(|_| self.random.chance(0.4)).collect();
+                *list(&mut self.world.things[index]) = unlinked;
             }
         }
     }

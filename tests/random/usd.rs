@@ -28,6 +28,7 @@ pub fn reduced(world: &World) -> World {
     for thing in &mut made.things {
         thing.hidden = false;
         thing.unlit.clear();
+        thing.unblocked.clear();
         match &mut thing.kind {
             ThingKind::Mesh { .. } => continue,
             ThingKind::Camera(lens) => lens.aperture = 0.0,

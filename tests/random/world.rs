@@ -61,6 +61,9 @@ pub struct Thing {
     /// Bodies that do not receive the light of the thing, if it is a light.
     #[serde(default)]
     pub unlit: Vec<u32>,
+    /// Bodies that do not block the light of the thing, if it is a light.
+    #[serde(default)]
+    pub unblocked: Vec<u32>,
 }
 
 /// Kind of a thing.
@@ -306,6 +309,7 @@ impl World {
             rests: false,
             hidden: false,
             unlit: vec![],
+            unblocked: vec![],
         });
         &mut self.things[index]
     }

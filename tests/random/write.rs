@@ -103,12 +103,14 @@ impl Writer {
             }
             ThingKind::Camera(lens) => self.camera(lens, &mut node),
         }
-        if world.things.iter().any(|thing| !thing.unlit.is_empty()) {
+        if world.things.iter().any(|thing| !(thing.unlit.is_empty() && thing.unblocked.is_empty())) {
             node["extras"]["caustique"]["collections"] = json!([format!("body {}", thing.body)]);
         }
-        if !thing.unlit.is_empty() {
-            let exclude: Vec<String> = thing.unlit.iter().map(|body| format!("body {body}")).collect();
-            node["extras"]["caustique"]["receivers"] = json!({"exclude": exclude});
+        for (key, bodies) in [("receivers", &thing.unlit), ("blockers", &thing.unblocked)] {
+            if !bodies.is_empty() {
+                let exclude: Vec<String> = bodies.iter().map(|body| format!("body {body}")).collect();
+                node["extras"]["caustique"][key] = json!({"exclude": exclude});
+            }
         }
         let mut above: Option<usize> = None;
         let last = thing.chain.len().saturating_sub(1);

@@ -162,6 +162,30 @@ def light_linking_except(stage):
 
 
 @feature
+def shadow_linking(stage):
+    """The body does not block the light of the lamp."""
+    clear = bpy.data.collections.new("clear")
+    clear.objects.link(stage.body)
+    clear.collection_objects[0].light_linking.link_state = "EXCLUDE"
+    stage.lamp.light_linking.blocker_collection = clear
+    stage.principled(**GREY)
+
+
+@feature
+def shadow_linking_only(stage):
+    """Only the floor blocks the light of the lamp, and only the body that of a glowing sheet below the floor."""
+    floor, body = (bpy.data.collections.new(name) for name in ("floor", "body"))
+    floor.objects.link(stage.floor)
+    body.objects.link(stage.body)
+    stage.lamp.light_linking.blocker_collection = floor
+    sheet = bpy.data.meshes.new("sheet")
+    sheet.from_pydata([(-2, -3, 0), (1, -3, 0), (1, 0, 0), (-2, 0, 0)], [], [(0, 1, 2, 3)])
+    sheet.materials.append(stage.material_of(lambda: stage.surface(stage.emission((1, 0.6, 0.2), 3))))
+    stage.place("sheet", sheet, (0, 0, -0.7)).light_linking.blocker_collection = body
+    stage.principled(Base_Color=(0.9, 0.9, 0.9), Metallic=1.0, Roughness=0.2)
+
+
+@feature
 def world_gradient(stage):
     _world_node(stage, "TexGradient", _turned(stage, (0, -math.pi / 2, 0.3)))
 

@@ -32,7 +32,7 @@ impl Candidate {
     /// effects of a scene and to check the user's options before `auto` chooses a candidate.
     pub const GATHERING: Candidate = Candidate::unguided(Method::Sppm);
 
-    /// Path tracing, which alone renders shadow catchers.
+    /// Path tracing, which alone renders shadow catchers and shadow linking.
     pub const CAMERA_PATHS: Candidate = Candidate::unguided(Method::Path);
 
     /// The candidate with this method, unguided light paths, and photons that carry all indirect light.

@@ -178,12 +178,13 @@ pub(super) struct ObjectExtras {
     pub(super) holdout: bool,
 }
 
-/// Light linking in `extras.caustique` of a node with a mesh or a light.
+/// Light linking and shadow linking in `extras.caustique` of a node with a mesh or a light.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct LinkExtras {
     pub(super) collections: Vec<String>,
     pub(super) receivers: Linked,
+    pub(super) blockers: Linked,
 }
 
 /// Content of `extras.caustique` of a camera, or of its node.
@@ -376,8 +377,17 @@ pub(super) const LIGHT: &[&str] = &[
     "gobo.view_deg",
 ];
 /// Keys of nodes, beside those of the cameras and lights that they place.
-pub(super) const NODE: &[&str] =
-    &["shadow_catcher", "holdout", "collections", "receivers", "receivers.include", "receivers.exclude"];
+pub(super) const NODE: &[&str] = &[
+    "shadow_catcher",
+    "holdout",
+    "collections",
+    "receivers",
+    "receivers.include",
+    "receivers.exclude",
+    "blockers",
+    "blockers.include",
+    "blockers.exclude",
+];
 
 /// Reads `extras.caustique` of a part of the document; the default if there are no extras. `place` names the part in
 /// errors.

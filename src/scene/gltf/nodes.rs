@@ -196,11 +196,11 @@ struct Inherited {
 
 impl Inherited {
     /// Adds the collections of a node, and returns its light linking; `None` if it has none.
-    fn link(&mut self, LinkExtras { collections, receivers }: LinkExtras) -> Option<Arc<Links>> {
+    fn link(&mut self, LinkExtras { collections, receivers, blockers }: LinkExtras) -> Option<Arc<Links>> {
         if !collections.is_empty() {
             Arc::make_mut(&mut self.collections).extend(collections);
         }
-        let links = Links { collections: self.collections.to_vec(), receivers };
+        let links = Links { collections: self.collections.to_vec(), receivers, blockers };
         (links != Links::default()).then(|| Arc::new(links))
     }
 }

@@ -20,12 +20,13 @@ use crate::transport::walk::camera_paths::{CameraPathStart, CameraPaths};
 use crate::transport::walk::cause::Cause;
 use crate::transport::walk::direct::caught_light;
 use crate::transport::walk::lobe_layers::{FirstScatter, LobeHistory};
-use crate::transport::walk::pass_through::{BulbHit, PassThroughHit};
+use crate::transport::walk::pass_through::{BulbHit, PassThroughHit, to_infinity};
 use crate::transport::walk::pixel_sample::PixelSample;
 use crate::transport::walk::roulette::SPARED_BY_ROULETTE;
 use crate::transport::walk::scattering_vertex::ScatterPoint;
+use crate::transport::walk::segment::Visibility;
 use crate::transport::walk::vertex::{MediumLight, MediumVertex, Next, Scattered, Vertex, Visitor};
-use crate::transport::walk::walk;
+use crate::transport::walk::{Segment, walk};
 use bumpalo::Bump;
 
 struct PathTracer<'a, R> {
@@ -146,6 +147,12 @@ impl<R: PathRecorder> PathTracer<'_, R> {
         self.on_catcher || (came_from_catcher && (instance.shadow_catcher || emits()))
     }
 
+    /// Whether a hit of a surface shows its light: the path finds lights with shadow linking apart from hits, see
+    /// [`Visitor::SHADOW_LINKS`].
+    fn sees(&self, instance: u32, scattered: Option<Scattered>) -> bool {
+        scattered.is_none() || self.scene.lights.links().blockers_of(instance).is_all()
+    }
+
     /// Decides how the path continues after a vertex.
     fn next(&self) -> Next {
         if self.history.leads(self.classes) { Next::Continue(LobeSet::ALL) } else { Next::Stop }
@@ -154,6 +161,7 @@ impl<R: PathRecorder> PathTracer<'_, R> {
 
 impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
     const BRANCHES: bool = true;
+    const SHADOW_LINKS: bool = true;
 
     #[inline]
     fn spared(&self) -> f32 {
@@ -196,8 +204,9 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
             return if self.on_catcher { self.next() } else { Next::Stop };
         }
         let from = if scattered.is_none() { Receiver::anywhere(vertex.from) } else { self.last };
-        if let Some((radiance, pdf)) =
-            self.scene.lights.hit_radiance(&self.scene.materials, &from, vertex.surface, vertex.wo)
+        if self.sees(vertex.surface.instance, scattered)
+            && let Some((radiance, pdf)) =
+                self.scene.lights.hit_radiance(&self.scene.materials, &from, vertex.surface, vertex.wo)
         {
             let (class, first) = (self.history.suffix.class_at_light(false), self.first(|| FirstScatter::Emit));
             let of = PathKind { class, group: self.scene.lights.surface_group(vertex.surface), first };
@@ -240,6 +249,27 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
             let (light, group) = (hit.throughput * radiance * weight, self.scene.lights.surface_group(&hit.surface));
             self.add_hit(&history, hit.depth, group, light, weight);
         }
+    }
+
+    #[cold]
+    fn linked_suns(&mut self, segment: &Segment<'_>) {
+        let Segment { start, throughput, depth, scattered, .. } = *segment;
+        if self.on_catcher {
+            return;
+        }
+        let (scene, last, history) = (self.scene, self.last, self.arriving(scattered));
+        scene.lights.for_each_linked_sun(&last, start.direction, |light, radiance, pdf| {
+            let Visibility { transmittance, flight } = to_infinity(scene, segment, light);
+            let scattered = scattered.map(|s| Scattered { pdf_w: s.pdf_w * flight.forward, ..s });
+            let weight = Self::weight(scattered, pdf);
+            self.add_hit(
+                &history,
+                depth,
+                scene.lights.group(light),
+                throughput * transmittance * radiance * weight,
+                weight,
+            );
+        });
     }
 
     fn sees_medium_light(&self, scattered: Option<Scattered>) -> bool {

@@ -10,7 +10,7 @@
 use super::lobe_layers::FirstScatter;
 use super::pass_through::for_each_pass_through_light;
 use super::scattering_vertex::ScatterPoint;
-use super::segment::{End, Start, next_surface, token};
+use super::segment::{End, Start, next_surface, token, with_blockers};
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3, is_lit};
 use crate::random::Purpose;
@@ -126,7 +126,7 @@ pub(in crate::transport) fn caught_light(scene: &Scene, vertex: &impl ScatterPoi
     if !(is_lit(arriving) && arriving.is_finite()) {
         return [Rgb::ZERO; 2];
     }
-    let token = token(scene, vertex.draws(), Purpose::ShadowAlpha);
+    let token = with_blockers(scene, token(scene, vertex.draws(), Purpose::ShadowAlpha), light.light);
     let origin = vertex.ray_origin(light.wi);
     let (direction, tmax) = match light.target {
         None => (light.wi, f32::INFINITY),
@@ -164,7 +164,7 @@ fn bsdf_sample<S: ScatterPoint>(scene: &Scene, vertex: &S, set: LobeSet, lobes: 
         }
         End::Medium(_) | End::Lost => {}
     }
-    for_each_pass_through_light(scene, &start, reach, S::IN_MEDIUM, |surface, _, left, _| {
+    for_each_pass_through_light(scene, &start, reach, S::IN_MEDIUM, false, |surface, _, left, _| {
         if let Some((radiance, pdf)) =
             scene.lights.hit_radiance(&scene.materials, &vertex.receiver(scene), surface, -sample.wi)
         {

@@ -303,13 +303,13 @@ impl Interior {
         if self.outer == EMPTY_STACK { inner } else { stronger(scene, self.outer, inner) }
     }
 
-    /// Linkings whose light the medium around the path receives ([`crate::geometry::Instance::receives`]).
+    /// Linkings that the medium around the path is part of ([`crate::geometry::Instance::linkings`]).
     #[inline]
-    pub fn receives(&self, scene: &Scene) -> u64 {
+    pub fn linkings(&self, scene: &Scene) -> u64 {
         if scene.lights.links().is_empty() {
             return ALL_LINKINGS;
         }
-        self.host(scene).map_or(scene.lights.links().medium_receives, |instance| scene.receives(instance))
+        self.host(scene).map_or(scene.lights.links().medium_linkings, |instance| scene.linkings(instance))
     }
 
     /// Whether a solid that is hidden from cameras fills the space around the path.

@@ -31,7 +31,7 @@ use bumpalo::Bump;
 use fire::MediumEmission;
 use flight::{Fly, Split};
 use interior::Interior;
-use pass_through::{BulbHit, PassThroughHit, for_each_bulb, for_each_pass_through_light};
+use pass_through::{BulbHit, BulbView, PassThroughHit, for_each_bulb, for_each_pass_through_light};
 use roulette::{MIN_DISPERSED_SHARE, branch_share, late_survival};
 use scattering_vertex::ScatterPoint;
 use segment::{Arrival, Attenuate, Clear, End, MediumArrival, PrecomputedHit, Start, camera_token, next_vertex, token};
@@ -298,6 +298,9 @@ impl<'a> Path<'a> {
         let segment = Segment { start: &start, end: &end, from_medium: self.in_medium, throughput, depth, scattered };
         if self.transport == Transport::Radiance && scene.pass_through_lights.is_some() {
             visit_pass_through_lights(scene, &segment, visitor);
+        }
+        if V::SHADOW_LINKS && scene.survey.shadow_links && scattered.is_some() {
+            visitor.linked_suns(&segment);
         }
         if self.transport == Transport::Radiance
             && scene.lights.has_bulbs()
@@ -607,24 +610,26 @@ impl<'a> Path<'a> {
 #[inline(never)]
 fn receives(scene: &Scene, end: &End, light: u32) -> bool {
     let (p, links) = match end {
-        End::Surface(arrival) => (arrival.surface.p, scene.receives(arrival.surface.instance)),
-        End::Medium(arrival) => (arrival.p, arrival.interior.receives(scene)),
+        End::Surface(arrival) => (arrival.surface.p, scene.linkings(arrival.surface.instance)),
+        End::Medium(arrival) => (arrival.p, arrival.interior.linkings(scene)),
         End::Escaped(_) | End::Lost => return true,
     };
     scene.lights.shines_on(light, &Receiver { links, ..Receiver::anywhere(p) })
 }
 
 /// A segment of a camera path that has been followed to its end.
-struct Segment<'s> {
-    start: &'s Start,
+pub struct Segment<'s> {
+    /// Start of the segment.
+    pub start: &'s Start,
     end: &'s End,
     /// Whether the segment starts at a vertex in a medium.
-    from_medium: bool,
-    throughput: Rgb,
+    pub from_medium: bool,
+    /// Throughput of the path at the start.
+    pub throughput: Rgb,
     /// Number of the segment, from 1.
-    depth: u32,
+    pub depth: u32,
     /// How the vertex at the start scattered the path.
-    scattered: Option<Scattered>,
+    pub scattered: Option<Scattered>,
 }
 
 /// Shows the visitor the pass-through lights on a segment.
@@ -634,11 +639,19 @@ fn visit_pass_through_lights<'a, V: Visitor<'a>>(scene: &Scene, segment: &Segmen
     let Segment { start, end, from_medium, throughput, depth, scattered } = *segment;
     // A split walk continues behind a vertex of a medium, and so do the lights.
     let reach = if let End::Surface(arrival) = end { arrival.distance } else { f32::INFINITY };
-    for_each_pass_through_light(scene, start, reach, from_medium, |surface, distance, transmittance, flight| {
-        let (surface, wo, throughput) = (*surface, -start.direction, throughput * transmittance);
-        let scattered = scattered.map(|s| Scattered { pdf_w: s.pdf_w * flight.forward, ..s });
-        visitor.pass_through_light(&PassThroughHit { surface, wo, throughput, depth, distance, flight }, scattered);
-    });
+    let linked = V::SHADOW_LINKS && scattered.is_some();
+    for_each_pass_through_light(
+        scene,
+        start,
+        reach,
+        from_medium,
+        linked,
+        |surface, distance, transmittance, flight| {
+            let (surface, wo, throughput) = (*surface, -start.direction, throughput * transmittance);
+            let scattered = scattered.map(|s| Scattered { pdf_w: s.pdf_w * flight.forward, ..s });
+            visitor.pass_through_light(&PassThroughHit { surface, wo, throughput, depth, distance, flight }, scattered);
+        },
+    );
 }
 
 /// Shows the visitor the bulbs of lights on a segment that starts at the camera or at a delta lobe.
@@ -647,7 +660,8 @@ fn visit_pass_through_lights<'a, V: Visitor<'a>>(scene: &Scene, segment: &Segmen
 fn visit_bulbs<'a, V: Visitor<'a>>(scene: &Scene, segment: &Segment<'_>, draws: Draws, visitor: &mut V) {
     let Segment { start, end, from_medium, throughput, depth, scattered } = *segment;
     let reach = if let End::Surface(arrival) = end { arrival.distance } else { f32::INFINITY };
-    for_each_bulb(scene, start, reach, from_medium, depth == 1, draws, |radiance, at, emitter| {
+    let seen = BulbView { reach, from_medium, camera: depth == 1, linked: V::SHADOW_LINKS && scattered.is_some() };
+    for_each_bulb(scene, start, &seen, draws, |radiance, at, emitter| {
         visitor.bulb(&BulbHit { light: throughput * radiance, emitter, depth, at }, scattered);
     });
 }

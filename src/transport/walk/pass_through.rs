@@ -3,13 +3,18 @@
 //! On each of its segments a camera path adds the light of the pass-through lights there, and continues to the surface
 //! behind. Light paths start from them, and next-event estimation samples them, as any other light. Shadow rays and
 //! light paths do not hit them. So all techniques sample the same paths with the same densities.
+//!
+//! Path tracing finds lights with shadow linking ([`crate::light::LightLinks`]) in the same way, with shadow rays that
+//! only the objects block that block their light, as Cycles does. Segments from the camera see them as other lights.
 
-use super::segment::{Destination, ShadowRay, Start, shadow_ray};
+use super::Segment;
+use super::segment::{Destination, ShadowRay, Start, Visibility, shadow_ray, with_blockers};
 use crate::geometry::Surface;
 use crate::math::{Rgb, Vec3};
 use crate::medium::FlightDensity;
 use crate::random::{Draws, Purpose};
 use crate::scene::Scene;
+use crate::scene::contact::ContactPoint;
 use crate::trace::{Hit, Ray};
 
 /// A segment of a camera path crosses a pass-through light, which emits but does not block rays.
@@ -29,19 +34,35 @@ pub struct PassThroughHit {
 }
 
 /// Calls `each` with every pass-through light on a ray up to the distance `reach`: its surface, distance, the
-/// transmittance up to it, and the densities of flight. Media attenuate its light; no collision is sampled.
+/// transmittance up to it, and the densities of flight. Media attenuate its light; no collision is sampled. If
+/// `linked`, lights with shadow linking are among them, at any distance; otherwise they are as other lights.
 #[inline]
 pub(in crate::transport) fn for_each_pass_through_light(
     scene: &Scene,
     start: &Start,
     reach: f32,
     from_medium: bool,
+    linked: bool,
     mut each: impl FnMut(&Surface, f32, Rgb, FlightDensity),
 ) {
     if let Some(pass_through_lights) = &scene.pass_through_lights {
         let Start { origin, direction, token, .. } = *start;
+        let linked = linked && scene.survey.shadow_links;
         let mut met = |hit: Hit| {
+            let links = scene.lights.links();
+            let is_linked = linked && !links.blockers_of(hit.instance).is_all();
+            if !is_linked && (hit.t > reach || !scene.passes(hit.instance)) {
+                return;
+            }
             let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else { return };
+            if is_linked {
+                if let Some(Visibility { transmittance, flight }) =
+                    linked_light(scene, start, from_medium, &surface, hit.t)
+                {
+                    each(&surface, hit.t, transmittance, flight);
+                }
+                return;
+            }
             let between = ShadowRay {
                 start: *start,
                 tmax: hit.t,
@@ -55,8 +76,44 @@ pub(in crate::transport) fn for_each_pass_through_light(
                 each(&surface, hit.t, visibility.transmittance, visibility.flight);
             }
         };
-        pass_through_lights.each_hit(&Ray { origin, direction, tmax: reach, token }, &mut met);
+        pass_through_lights
+            .each_hit(&Ray { origin, direction, tmax: if linked { f32::INFINITY } else { reach }, token }, &mut met);
     }
+}
+
+/// The shadow ray from the start of a segment to the point at the distance `t` on a light with shadow linking; `None`
+/// if it is blocked.
+#[cold]
+fn linked_light(scene: &Scene, start: &Start, from_medium: bool, surface: &Surface, t: f32) -> Option<Visibility> {
+    let light = scene.lights.surface_light(surface)?;
+    // As next-event estimation, so that both techniques agree whether the point is visible.
+    let target = surface.shadow_end(-start.direction, t);
+    let to = target - start.origin;
+    let tmax = to.length();
+    let token = with_blockers(scene, start.token, light);
+    let between = ShadowRay {
+        start: Start { direction: to / tmax, token, ..*start },
+        tmax,
+        reaching: ContactPoint::on_light(scene, light, target),
+        in_medium: [from_medium, false],
+        destination: Destination::Any,
+        to_lens: false,
+    };
+    Some(shadow_ray(scene, &between)).filter(|visibility| visibility.transmittance != Rgb::ZERO)
+}
+
+/// The shadow ray along a segment to a light at infinity; only the objects block it that block the light.
+pub(in crate::transport) fn to_infinity(scene: &Scene, segment: &Segment<'_>, light: u32) -> Visibility {
+    let token = with_blockers(scene, segment.start.token, light);
+    let between = ShadowRay {
+        start: Start { token, ..*segment.start },
+        tmax: f32::INFINITY,
+        reaching: None,
+        in_medium: [segment.from_medium, false],
+        destination: Destination::Any,
+        to_lens: false,
+    };
+    shadow_ray(scene, &between)
 }
 
 /// A segment of a camera path crosses the bulb of a light ([`crate::light::Bulb`]).
@@ -71,22 +128,37 @@ pub struct BulbHit {
     pub at: Vec3,
 }
 
-/// Calls `each` with every bulb on a ray up to the distance `reach`: the radiance that arrives at the origin, a point in
-/// the bulb, and the index of its light. The ray starts in a medium, or at the camera.
+/// Which bulbs a ray sees.
+pub(in crate::transport) struct BulbView {
+    /// Distance up to which the ray sees bulbs.
+    pub reach: f32,
+    /// Whether the ray starts at a vertex in a medium.
+    pub from_medium: bool,
+    /// Whether the ray starts at the camera.
+    pub camera: bool,
+    /// Whether bulbs of lights with shadow linking are seen at any distance, through objects that do not block their
+    /// light.
+    pub linked: bool,
+}
+
+/// Calls `each` with every bulb on a ray: the radiance that arrives at the origin, a point in the bulb, and the index
+/// of its light.
 pub(in crate::transport) fn for_each_bulb(
     scene: &Scene,
     start: &Start,
-    reach: f32,
-    from_medium: bool,
-    camera: bool,
+    view: &BulbView,
     draws: Draws,
     mut each: impl FnMut(Rgb, Vec3, u32),
 ) {
     // Media attenuate the light of the bulb's points differently.
     let u = if scene.survey.media { draws.one(Purpose::Bulb) } else { 0.5 };
+    let BulbView { from_medium, camera, .. } = *view;
+    let is_linked = |light| view.linked && !scene.lights.blockers(light).is_all();
+    let reach = |light| if is_linked(light) { f32::INFINITY } else { view.reach };
     scene.lights.for_each_bulb(start.origin, start.direction, reach, camera, u, |radiance, distance, emitter| {
+        let token = if is_linked(emitter) { with_blockers(scene, start.token, emitter) } else { start.token };
         let between = ShadowRay {
-            start: *start,
+            start: Start { token, ..*start },
             tmax: distance,
             reaching: None,
             in_medium: [from_medium, false],

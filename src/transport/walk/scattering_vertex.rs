@@ -3,7 +3,7 @@
 use super::interior::Interior;
 use super::lobe_layers::FirstScatter;
 use super::roulette::survival;
-use super::segment::{Destination, ShadowRay, Start, Visibility, shadow_ray, token};
+use super::segment::{Destination, ShadowRay, Start, Visibility, shadow_ray, token, with_blockers};
 use super::vertex::{MediumVertex, Vertex};
 use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use crate::light::{DirectSample, Emitter, Receiver, VolumeLight};
@@ -112,7 +112,7 @@ pub trait ScatterPoint {
     /// Traces a shadow ray to a light of [`ScatterPoint::sample_light`].
     #[inline]
     fn shadow_ray_to_light(&self, scene: &Scene, light: &DirectSample) -> Visibility {
-        let token = token(scene, self.draws(), Purpose::ShadowAlpha);
+        let token = with_blockers(scene, token(scene, self.draws(), Purpose::ShadowAlpha), light.light);
         let reaching = light.target.and_then(|target| ContactPoint::on_light(scene, light.light, target));
         let destination = match scene.lights.emitters().get(light.light as usize) {
             Some(Emitter::Volume(VolumeLight { instance, .. })) if scene.survey.fire => Destination::Inside(*instance),
@@ -171,7 +171,7 @@ impl ScatterPoint for Vertex<'_, '_> {
 
     #[inline]
     fn receiver(&self, scene: &Scene) -> Receiver {
-        let links = scene.receives(self.surface.instance);
+        let links = scene.linkings(self.surface.instance);
         Receiver { n: lit_side(self.shading, self.surface.ng, self.wo), links, ..Receiver::anywhere(self.surface.p) }
     }
 
@@ -267,7 +267,7 @@ impl ScatterPoint for MediumVertex {
 
     #[inline]
     fn receiver(&self, scene: &Scene) -> Receiver {
-        let links = self.arrival.interior.receives(scene);
+        let links = self.arrival.interior.linkings(scene);
         Receiver { in_medium: true, links, ..Receiver::anywhere(self.arrival.p) }
     }
 

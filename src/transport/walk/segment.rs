@@ -3,13 +3,14 @@
 
 use super::interior::{Crossing, Interior, Presence, ior};
 use crate::geometry::Surface;
+use crate::light::Linking;
 use crate::material::MediumParameters;
 use crate::math::{Rgb, Vec3};
 use crate::medium::{FlightDensity, GridRay};
 use crate::random::{Draws, HashSequence, Purpose, mix};
 use crate::scene::Scene;
 use crate::scene::contact::{self, ContactPoint, RaySurfaces};
-use crate::trace::{CAMERA_RAY_BIT, Hit, Ray};
+use crate::trace::{CAMERA_RAY_BIT, Hit, LINKING_BITS, Ray};
 
 /// Largest number of boundaries without scattering that a path segment may cross, as between many drops of one liquid.
 /// More are taken for a numerical trap and end the path.
@@ -221,6 +222,9 @@ fn boundary(
         let ratio = if to_lens { after / before } else { before / after };
         return Boundary::None(Rgb::splat(ratio * ratio), crossing.interior);
     }
+    if passes_unlinked_solids(scene, token) && !blocks(scene, token, surface.instance) {
+        return Boundary::None(Rgb::ONE, crossing.interior);
+    }
     // A surface that emits light is never skipped.
     if crossing.is_nothing() && !material.emits() {
         return Boundary::None(Rgb::ONE, crossing.interior);
@@ -242,7 +246,17 @@ fn boundary(
 #[inline(always)]
 pub(in crate::transport) fn token(scene: &Scene, draws: Draws, purpose: Purpose) -> u32 {
     let bits = if scene.survey.alpha || scene.survey.grids { draws.token(purpose) } else { 0 };
+    let bits = if scene.survey.shadow_links { bits & !LINKING_BITS } else { bits };
     with_camera_bit(scene, bits, false)
+}
+
+/// The token of a shadow ray to the light with index `light`, which only the objects block that block its light.
+#[inline(always)]
+pub(in crate::transport) fn with_blockers(scene: &Scene, token: u32, light: u32) -> u32 {
+    if !scene.survey.shadow_links {
+        return token;
+    }
+    scene.lights.blockers(light).mark(token)
 }
 
 /// Random bits as [`token`], for a ray from or to the lens. Such rays pass objects that are hidden from cameras.
@@ -266,10 +280,29 @@ fn passes_hidden_solids(scene: &Scene, token: u32) -> bool {
     scene.survey.hidden_solids && token & CAMERA_RAY_BIT != 0
 }
 
+/// Whether the ray of a token is a shadow ray to a light with shadow linking, in a scene with solids that do not block
+/// such light. The ray crosses their boundaries straight, and meets no medium where such a solid fills the space.
+#[inline(always)]
+fn passes_unlinked_solids(scene: &Scene, token: u32) -> bool {
+    scene.survey.unlinked_solids && token & LINKING_BITS != 0
+}
+
+/// Whether an instance blocks the light to which the shadow ray of a token leads. The scene has shadow linking.
+#[inline]
+fn blocks(scene: &Scene, token: u32, instance: u32) -> bool {
+    Linking::of_ray(token).has(scene.linkings(instance))
+}
+
 /// The medium that affects a ray inside these solids; `None` without one.
 #[inline(always)]
 fn medium(scene: &Scene, interior: &Interior, token: u32) -> Option<MediumParameters> {
-    if passes_hidden_solids(scene, token) && interior.is_hidden(scene) { None } else { interior.medium(scene) }
+    if passes_hidden_solids(scene, token) && interior.is_hidden(scene) {
+        return None;
+    }
+    if passes_unlinked_solids(scene, token) && interior.host(scene).is_some_and(|host| !blocks(scene, token, host)) {
+        return None;
+    }
+    interior.medium(scene)
 }
 
 /// Start of a ray between two path vertices.
@@ -464,6 +497,7 @@ pub fn shadow_ray(scene: &Scene, between: &ShadowRay) -> Visibility {
     if scene.survey.null_boundaries
         || culls
         || passes_hidden_solids(scene, token)
+        || passes_unlinked_solids(scene, token)
         || leaving.is_some()
         || reaching.is_some()
     {

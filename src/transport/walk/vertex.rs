@@ -1,5 +1,6 @@
 //! Vertices of a path, and the visitor that receives them.
 
+use super::Segment;
 use super::interior::{Interior, Presence};
 use super::pass_through::{BulbHit, PassThroughHit};
 use super::pixel_sample::Features;
@@ -179,6 +180,9 @@ pub trait Visitor<'a>: Sized {
     const SPLITS: bool = false;
     /// Whether paths may split: [`Visitor::splits`] may be above 0.
     const BRANCHES: bool = false;
+    /// Whether the path finds the lights with shadow linking behind objects that do not block their light
+    /// (`pass_through.rs`), and ignores them where it hits them otherwise, except from the camera.
+    const SHADOW_LINKS: bool = false;
     /// Fraction of the initial throughput down to which roulette does not end a path (except trapped light). Below it,
     /// a path survives with probability throughput over that fraction.
     #[inline]
@@ -216,8 +220,14 @@ pub trait Visitor<'a>: Sized {
     fn pass_through_light(&mut self, hit: &PassThroughHit, scattered: Option<Scattered>) {
         let _ = (hit, scattered);
     }
-    /// Whether [`Visitor::medium_light`] is to be called for the segment that the path follows now. `scattered`: how the
-    /// path was scattered at the start of the segment; `None` at the start of the path.
+    /// The path follows a segment that does not start at the camera. Suns with shadow linking may shine along it
+    /// through objects that do not block their light. Called if [`Visitor::SHADOW_LINKS`].
+    #[inline]
+    fn linked_suns(&mut self, segment: &Segment<'_>) {
+        let _ = segment;
+    }
+    /// Whether [`Visitor::medium_light`] is to be called for the segment that the path follows now. `scattered`: how
+    /// the path was scattered at the start of the segment; `None` at the start of the path.
     #[inline]
     fn sees_medium_light(&self, scattered: Option<Scattered>) -> bool {
         let _ = scattered;
