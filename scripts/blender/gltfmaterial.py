@@ -217,6 +217,10 @@ class _Entry:
                             (("", "specular"), ("Color", "specular_colour")) if self.varies(name)})
         if content and (self.varies("metallic") or self.factor("metallic") < 1):  # metals have none
             self.extension("specular", content)
+        if min(self.channels["reflection"]) < 1:
+            self.own(reflection_color=list(self.channels["reflection"]))
+        if self.channels["single_scattering"]:
+            self.own(single_scattering=True)
         self._film()
         if self.varies("direction", "anisotropy") or self.factor("anisotropy") > 0:
             content = {"anisotropyStrength": self.factor("anisotropy")}

@@ -1,6 +1,6 @@
 """Translates each shader node of Cycles to a lobe of the glTF material, with a warning for each loss."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 
@@ -32,6 +32,8 @@ class Lobe:
     ior: object = 1.5
     specular: object = 0.0
     specular_colour: object = WHITE
+    reflection: tuple = WHITE  # factor on the reflectance at all angles, a constant
+    single_scattering: bool = False  # light that facets scatter more than once is lost
     coat: object = 0.0
     coat_roughness: object = 0.0
     coat_ior: object = 1.5
@@ -133,9 +135,6 @@ class Reader:
     def _glossy(self, leaf):
         """Glossy reflectance is constant; a metal's rises at grazing angles, by 1/21 of the remainder on average."""
         colour = self.get(leaf, "Color")
-        if is_constant(colour) and max(colour) - min(colour) > 0.1:
-            self.say("the reflectance of its tinted Glossy shader rises towards the rim; "
-                     "use a Metallic BSDF, whose reflectance rises in both")
         colour = self.graph.maximum(self.graph.multiply(self.graph.subtract(colour, 1 / 21), 21 / 20), 0.0)
         return self._facets(leaf, Lobe(base=colour, metallic=1.0, specular=0.0))
 
@@ -163,15 +162,31 @@ class Reader:
         lobe = Lobe(base=colour, roughness=self.get(leaf, "Roughness"), transmission=1.0, ior=self.get(leaf, "IOR"),
                     normal=self.normal(leaf))
         if leaf.type == "BSDF_GLASS":  # Cycles also tints its reflection
-            lobe.specular = self.graph.minimum(self.graph.max_component(colour), 1.0)
-            lobe.specular_colour = self.graph.divide(colour, self.graph.maximum(lobe.specular, 1e-6))
-            if is_constant(colour) and min(colour) < 0.65:
-                self.say("the tint of its Glass shader's reflections is carried at steep angles only: its rim is brighter "
-                         "than in Cycles; tint a Principled BSDF with Transmission instead, whose reflections are white in "
-                         "both")
+            lobe.specular = 1.0
+            if is_constant(colour):
+                lobe.reflection = tuple(min(max(c, 0.0), 1.0) for c in colour)
+            else:
+                self._tint(lobe, colour)
         self._distribution(leaf, lobe)
         self._film(leaf, lobe)
         return lobe
+
+    def _tint(self, lobe, colour):
+        """Tint the reflection at steep angles."""
+        lobe.specular = self.graph.minimum(self.graph.max_component(colour), 1.0)
+        lobe.specular_colour = self.graph.divide(colour, self.graph.maximum(lobe.specular, 1e-6))
+
+    def mixed(self, lobe):
+        """The lobe as a part of a mix, without a factor on the reflectance at all angles."""
+        if lobe.reflection == WHITE:
+            return lobe
+        if min(lobe.reflection) < 0.65:
+            self.say("the tint of its Glass shader's reflections is carried at steep angles only: its rim is brighter "
+                     "than in Cycles; tint a Principled BSDF with Transmission instead, whose reflections are white in "
+                     "both")
+        found = replace(lobe, reflection=WHITE)
+        self._tint(found, lobe.reflection)
+        return found
 
     def _film(self, leaf, lobe):
         """Set the thin film. Metals have one from Blender 5.0 on."""
@@ -223,15 +238,21 @@ class Reader:
     def _darkened(self, lobe):
         """The base colour c / (1 + loss c) with which a metal that loses no light reflects as one that does.
 
-        Such a metal reflects c E / (1 - c (1 - E)) on average [Kulla and Conty 2017], with E = 1 - loss. A fit over
-        GGX's alpha gives the loss within 0.01.
+        Such a metal reflects c E / (1 - c (1 - E)) on average [Kulla and Conty 2017], with E = 1 - loss.
         """
         g = self.graph
+        return self._of_metal(lobe, g.divide(lobe.base, g.add(1.0, g.multiply(lobe.base, self._loss(lobe)))))
+
+    def _loss(self, lobe):
+        """The share of light that round facets of the lobe's roughness lose. A fit over GGX's alpha, within 0.01."""
+        g = self.graph
         alpha = g.multiply(lobe.roughness, lobe.roughness)
-        loss = g.multiply(alpha, g.add(0.2914, g.multiply(alpha, g.subtract(0.8964, g.multiply(alpha, 0.6038)))))
-        dark = g.divide(lobe.base, g.add(1.0, g.multiply(lobe.base, loss)))
-        rest = g.subtract(1.0, lobe.metallic)
-        return g.add(g.multiply(dark, lobe.metallic), g.multiply(lobe.base, rest))
+        return g.multiply(alpha, g.add(0.2914, g.multiply(alpha, g.subtract(0.8964, g.multiply(alpha, 0.6038)))))
+
+    def _of_metal(self, lobe, colour):
+        """The base colour of a lobe whose metal has this colour."""
+        g, rest = self.graph, self.graph.subtract(1.0, lobe.metallic)
+        return g.add(g.multiply(colour, lobe.metallic), g.multiply(lobe.base, rest))
 
     def _stretched(self, leaf, lobe, stretch):
         """Set anisotropy and tangent from the stretch s.
@@ -240,6 +261,8 @@ class Reader:
         glTF: alpha across; along, alpha and 1 are interpolated by the squared strength.
         """
         g, turn = self.graph, self.get(leaf, "Anisotropic Rotation")
+        if lobe.transmission == 0.0:
+            self._keep_light_of_round_facets(lobe)
         alpha = g.multiply(lobe.roughness, lobe.roughness)
         if leaf.type == "BSDF_PRINCIPLED":
             aspect = g.power(g.subtract(1.0, g.multiply(0.9, stretch)), 0.5)
@@ -254,9 +277,19 @@ class Reader:
         lobe.anisotropy = g.power(g.maximum(g.divide(g.subtract(along, across), rest), 0.0), 0.5)
         lobe.roughness = g.power(across, 0.5)
         lobe.tangent = self._tangent(leaf, turn)
-        self.say("its stretched highlights keep the few per cent of light that Cycles loses between facets; "
-                 "darken its colour by a few per cent to match Cycles")
         return lobe
+
+    def _keep_light_of_round_facets(self, lobe):
+        """Let stretched facets lose the light that they lose in Cycles, which returns only what round facets lose.
+
+        It multiplies their highlight by 1 / (1 - c loss) on average, with c the colour.
+        """
+        g, lobe.single_scattering = self.graph, True
+        bright = g.divide(lobe.base, g.subtract(1.0, g.multiply(lobe.base, self._loss(lobe))))
+        if is_constant(bright) and max(bright) > 1.02 and lobe.metallic != 0.0:
+            self.say("its stretched highlights lose the few per cent of light that facets scatter more than once; "
+                     "darken its colour below 0.9 to see the same in both")
+        lobe.base = self._of_metal(lobe, g.minimum(bright, 1.0))
 
     def _tangent(self, leaf, turns):
         """The rotated tangent of an anisotropic shader: the Tangent input, or Blender's default about the object's

@@ -142,7 +142,7 @@ class _Match:
         if self.adds_up or (is_constant(whole) and abs(whole - 1) < 1e-6):
             whole = 1.0
         parts = [g.divide(part, whole) for _, part in lobes]
-        lobes = [lobe for lobe, _ in lobes]
+        lobes = [self.reader.mixed(lobe) for lobe, _ in lobes]
         inside = self._inside(lobes)
         if inside is None:
             lobes = [replace(lobe, subsurface=None, sheet=0.0) if lobe.subsurface is not None else lobe for lobe in lobes]
@@ -178,8 +178,9 @@ class _Match:
 
     @staticmethod
     def _is_dark_gloss(lobe, kind):
-        """Whether a shader is so dark a gloss that a metal's rise at grazing angles would show."""
-        return kind in _GLOSSY and is_constant(lobe.base) and max(lobe.base) < 0.7
+        """Whether a shader is so dark or coloured a gloss that a metal's rise at grazing angles would show."""
+        constant = kind in _GLOSSY and is_constant(lobe.base)
+        return constant and (max(lobe.base) < 0.7 or max(lobe.base) - min(lobe.base) > 0.1)
 
     def _sum(self, values, weights):
         """The weighted mean of values, exact if all are one constant. Weights need not sum to one."""
@@ -215,6 +216,9 @@ class _Match:
         if self._differ([lobe.roughness for lobe, _ in shiny]):
             self.say("its mixed shaders differ in roughness: the mean is taken; "
                      "give its Glossy shaders one Roughness")
+        if not dull and is_constant(gloss):
+            return replace(shiny[0][0], base=BLACK, metallic=0.0, ior=0.0, specular=1.0, reflection=gloss,
+                           roughness=self._sum([lobe.roughness for lobe, _ in shiny], [part for _, part in shiny]))
         strongest = g.max_component(gloss)
         rest = g.subtract(1.0, strongest)
         first = shiny[0][0]
@@ -224,7 +228,7 @@ class _Match:
             base=g.clamp(g.divide(under, rest if is_constant(rest) else g.maximum(rest, 1e-3))),
             roughness=self._sum([lobe.roughness for lobe, _ in shiny], [part for _, part in shiny]),
             ior=0.0, specular=strongest, specular_colour=g.divide(gloss, g.maximum(strongest, 1e-6)),
-            anisotropy=first.anisotropy, tangent=first.tangent)
+            anisotropy=first.anisotropy, tangent=first.tangent, single_scattering=first.single_scattering)
 
     @staticmethod
     def _differ(values):
@@ -248,6 +252,7 @@ class _Match:
         found = Lobe(**{name: self._sum([getattr(lobe, name) for lobe in lobes], weights)
                         for name, weights in over.items()})
         found.thin = any(lobe.thin for lobe in lobes)
+        found.single_scattering = any(lobe.single_scattering for lobe in lobes)
         if found.thin:
             found.roughness = self._sum([lobe.roughness for lobe in lobes], parts)
         found.tangent = next((lobe.tangent for lobe in lobes if lobe.tangent is not None), None)

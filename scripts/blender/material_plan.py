@@ -117,7 +117,7 @@ class Plan:
             self.of_object = standin.depends_on_object(self.graph)
             self.varies_on_object = any(value is None or self.graph.varies(value, standin.is_even_on_object)
                                         for value in self.passes.values())
-            names = [_DISPLAY_NAMES[n] for n in varying if n not in {"direction"}]
+            names = [_DISPLAY_NAMES[n] for n in varying if n != "direction" or len(varying) == 1]
             self.say(f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} baked to images of {self.baker.size} x "
                      f"{self.baker.size} texels, which blur finer detail; use image textures there, or a larger "
                      "--bake-size of export.py")

@@ -14,6 +14,8 @@ pub(super) struct Dielectric {
     pub f0: Rgb,
     /// Reflectance at grazing incidence.
     pub f90: f32,
+    /// Factor on the reflectance at all angles.
+    pub color: Rgb,
     /// Thin film, and the index of refraction per channel of the dielectric below it; `None` without a film.
     pub film: Option<(Film, Rgb)>,
     thin: bool,
@@ -29,7 +31,7 @@ impl Dielectric {
             ((p.specular_color * normal_incidence(p.eta)).min(Rgb::ONE) * p.specular, p.specular)
         };
         let smooth = [Smooth::new(p.eta), Smooth::new(if p.thin { p.eta } else { 1.0 / p.eta })];
-        Dielectric { smooth, f0, f90, film, thin: p.thin }
+        Dielectric { smooth, f0, f90, color: p.reflection_color, film, thin: p.thin }
     }
 
     /// Reflectance and transmittance at a facet where light arrives at cosine `cos` on `side` (0 above, 1 below), and
@@ -39,10 +41,10 @@ impl Dielectric {
         let Some((grazing, cos_t)) = self.smooth[side].grazing_weight(cos) else { return (Rgb::ONE, Rgb::ZERO, 0.0) };
         let f = self.f0 + (Rgb::splat(self.f90) - self.f0) * grazing;
         let t = Rgb::splat((1.0 - f.max_element()).max(0.0));
-        let Some((film, base)) = &self.film else { return (f, t, cos_t) };
+        let Some((film, base)) = &self.film else { return (f * self.color, t, cos_t) };
         let above = if side == 1 && !self.thin { cos_t } else { cos };
         let covered = film.reflectance(above, *base) * self.f90;
-        (f.lerp(covered, film.strength), t.lerp(Rgb::ONE - covered, film.strength), cos_t)
+        (f.lerp(covered, film.strength) * self.color, t.lerp(Rgb::ONE - covered, film.strength), cos_t)
     }
 
     /// Average reflectance from above of an interface with a film, over the hemisphere.

@@ -149,7 +149,7 @@ impl Gathering<'_> {
         std::array::from_fn(|c| {
             let (base, f0) = (layered.base[c], n.dielectric.f0[c]);
             let metal = (schlick * (1.0 - base) + base) * layered.metal;
-            let matte = (grazing * (n.dielectric.f90 - f0) + f0) * layered.matte;
+            let matte = (grazing * (n.dielectric.f90 - f0) + f0) * (layered.matte * n.dielectric.color[c]);
             (metal + matte) * value + loss * layered.reflected_compensation[c] + through * layered.diffuse[c]
         })
     }

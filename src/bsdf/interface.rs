@@ -47,6 +47,8 @@ pub struct Interface<'a> {
     pub(super) average: Rgb,
     /// Albedo of multiple scattering between the facets, relative to a perfect reflector.
     pub(super) multiple_scattering: Rgb,
+    /// Whether light that facets scatter more than once is lost, except in solid glass.
+    pub(super) single_scattering: bool,
     /// Energy share that single scattering loses at a perfect reflector, as a function of the cosine; for anisotropic
     /// roughness a mean over azimuths.
     pub(super) loss: Profile,
@@ -130,7 +132,7 @@ impl<'a> Interface<'a> {
         let sides = tables.sides(table_eta);
         let average = sides.map_or(Rgb::ZERO, |[above, _]| {
             let of = |f0: f32| above.average_reflectance(f0, f90);
-            if filmed { dielectric.average() } else { Rgb::new(of(f0.x), of(f0.y), of(f0.z)) }
+            if filmed { dielectric.average() } else { Rgb::new(of(f0.x), of(f0.y), of(f0.z)) * dielectric.color }
         });
         let all_glass = bends && p.metallic == 0.0 && p.transmission == 1.0;
         let stretched = (rough && ggx.alpha_x != ggx.alpha_y && !all_glass)
@@ -141,7 +143,10 @@ impl<'a> Interface<'a> {
             None if rough => tables.white_loss(alpha),
             None => Profile::constant(0.0),
         };
-        let multiple_scattering = if rough { multiple_scattering(average, 1.0 - loss.average) } else { Rgb::ZERO };
+        let multiple_scattering = match rough && !p.single_scattering {
+            true => multiple_scattering(average, 1.0 - loss.average),
+            false => Rgb::ZERO,
+        };
         let f0_max = if filmed { dielectric.upper_f0(table_eta) } else { f0.max_element() };
         let through = match sides {
             Some([above, _]) => above.base_transmittance(alpha, f0_max, f90, multiple_scattering.max_element()),
@@ -172,6 +177,7 @@ impl<'a> Interface<'a> {
             dielectric,
             average,
             multiple_scattering,
+            single_scattering: p.single_scattering,
             loss,
             anisotropic_loss: stretched.map(|loss| keep(&[loss])),
             through,

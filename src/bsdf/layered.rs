@@ -175,7 +175,7 @@ impl<'a> Layered<'a> {
         let glass = if matched { 0.0 } else { glass };
         let (mut reflected_compensation, mut transmitted_compensation) = (Rgb::ZERO, Rgb::ZERO);
         let metal_average = interface.metal_average(base);
-        if class != LobeSet::DELTA {
+        if class != LobeSet::DELTA && !interface.single_scattering {
             let lost = interface.loss.average;
             let scale = FRAC_1_PI / lost.max(1e-9);
             reflected_compensation = interface.multiple_scattering * (matte * scale);
@@ -346,13 +346,13 @@ impl<'a> Layered<'a> {
                 let reflected = glass.reflected_along(side, at, view.o);
                 let transmitted = (1.0 - loss - reflected).max(0.0);
                 let smooth = n.dielectric.fresnel(cos, side).0;
-                let tint = smooth / smooth.max_element().max(f32::MIN_POSITIVE);
+                let tint = smooth * (n.dielectric.color.max_element() / smooth.max_element().max(f32::MIN_POSITIVE));
                 let single =
                     self.opaque(cos) * (1.0 - view.loss) + (tint * reflected + self.base * transmitted) * self.glass;
                 let same = self.glass * glass.reflected_compensation[side] * loss * glass.loss[side].average * PI;
                 let other = glass.loss[1 - side].average * n.index2(1 - side);
                 let across = self.base * (self.glass * glass.transmitted_compensation * loss * other * PI);
-                [single, reflected_compensation + Rgb::splat(same), transmitted_compensation + across]
+                [single, reflected_compensation + n.dielectric.color * same, transmitted_compensation + across]
             }
             None => {
                 let (r, t, _) = self.fresnel(cos, view.side);

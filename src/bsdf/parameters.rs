@@ -31,6 +31,10 @@ pub struct Parameters {
     pub specular: f32,
     /// Colour of the dielectric's reflection at normal incidence (KHR_materials_specular); may exceed 1.
     pub specular_color: Rgb,
+    /// Colour of the dielectric's reflection at all angles. What it takes away is lost.
+    pub reflection_color: Rgb,
+    /// Whether light that facets scatter more than once is lost. Solid glass keeps it.
+    pub single_scattering: bool,
     /// Strength of the thin film on the interface (KHR_materials_iridescence).
     pub film: f32,
     /// Index of refraction of the thin film over the index above the surface.
@@ -69,6 +73,8 @@ impl Default for Parameters {
             thin: false,
             specular: 0.0,
             specular_color: Rgb::ONE,
+            reflection_color: Rgb::ONE,
+            single_scattering: false,
             film: 0.0,
             film_eta: 1.3,
             film_path: 0.0,

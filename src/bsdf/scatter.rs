@@ -155,7 +155,7 @@ impl Layered<'_> {
                 let loss_i;
                 (loss_i, density) = glass.loss_with_pdf_w(side, at_i, i);
                 let lost = glass.loss_along(side, view.at, view.o) * loss_i;
-                separable[1] = Rgb::splat(self.glass * glass.reflected_compensation[side] * lost);
+                separable[1] = n.dielectric.color * (self.glass * glass.reflected_compensation[side] * lost);
             }
             if PDF {
                 let visible = value * both / (view.o.z + view.root);

@@ -82,6 +82,8 @@ impl Material {
             thin: self.thin,
             specular: self.specular.at(surface, textures),
             specular_color: self.specular_color.factor.max(Rgb::ZERO),
+            reflection_color: self.reflection_color,
+            single_scattering: self.single_scattering,
             ..Parameters::default()
         };
         let alpha = sqr(self.roughness.at(surface, textures));

@@ -89,6 +89,10 @@ pub struct Material {
     pub specular: Input<f32, 3>,
     /// Colour of the dielectric's specular reflection at normal incidence (KHR_materials_specular).
     pub specular_color: Input<Rgb>,
+    /// Colour of the dielectric's specular reflection at all angles.
+    pub reflection_color: Rgb,
+    /// Whether light that facets scatter more than once is lost, except in solid glass.
+    pub single_scattering: bool,
     /// Strength of the thin film on the interface, 0 to 1 (KHR_materials_iridescence).
     pub iridescence: Input<f32>,
     /// Index of refraction of the thin film, at least 1.
@@ -243,6 +247,8 @@ impl Default for Material {
             optical_contact: false,
             specular: 1.0.into(),
             specular_color: Rgb::ONE.into(),
+            reflection_color: Rgb::ONE,
+            single_scattering: false,
             iridescence: 0.0.into(),
             iridescence_ior: 1.3,
             iridescence_thickness: [100.0, 400.0].into(),

@@ -11,6 +11,7 @@ use caustique::bsdf::{
 use caustique::math::{Rgb, Vec2, Vec3};
 use caustique::random::mix;
 use rayon::prelude::*;
+use std::f32::consts::PI;
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
 use support::bsdf;
@@ -175,6 +176,22 @@ fn all() -> Vec<(String, Parameters)> {
         .map(|(name, p)| (format!("{name} of colour"), Parameters { clearcoat_color: Rgb::new(0.9, 0.3, 0.0), ..*p }))
         .collect();
     list.extend(coats);
+    for (name, p) in [
+        ("smooth glass", glass(0.0, 1.5)),
+        ("glass", glass(0.3, 1.5)),
+        ("thin wall", thin(0.3)),
+        ("plastic", plastic(0.25, 1.5)),
+        ("legacy ior 0", plastic(0.3, f32::INFINITY)),
+        ("plastic with a film", filmed(plastic(0.1, 1.5))),
+    ] {
+        let reflection_color = Rgb::new(0.9, 0.4, 0.1);
+        list.push((format!("{name} of coloured reflection"), Parameters { reflection_color, ..p }));
+    }
+    for (name, p) in [("metal", metal(0.5)), ("plastic", plastic(0.5, 1.5)), ("thin wall", thin(0.5))] {
+        let stretched = Parameters { alpha_x: 0.9, alpha_y: 0.2, single_scattering: true, ..p };
+        list.push((format!("stretched {name} of single scattering"), stretched));
+        list.push((format!("{name} of single scattering"), Parameters { single_scattering: true, ..p }));
+    }
     list.push(("black metal".into(), Parameters { base_color: Rgb::ZERO, ..metal(0.3) }));
     list.push(("black glass".into(), Parameters { base_color: Rgb::ZERO, ..glass(0.3, 1.5) }));
     list.push(("black".into(), Parameters { base_color: Rgb::ZERO, ..Parameters::default() }));
@@ -588,6 +605,47 @@ fn reflectance_at_normal_incidence_follows_the_extensions() {
     near(mirror(Parameters { clearcoat: 0.5, base_color: Rgb::ZERO, ..Parameters::default() }), Rgb::splat(0.02));
     let dense = Parameters { clearcoat: 1.0, clearcoat_eta: 2.0, base_color: Rgb::ZERO, ..Parameters::default() };
     near(mirror(dense), Rgb::splat(1.0 / 9.0));
+}
+
+/// The colour of the reflection counts at all angles, and takes no light from transmission.
+#[test]
+fn reflection_has_its_colour_at_all_angles() {
+    let color = Rgb::new(0.9, 0.4, 0.1);
+    let tinted = |p: Parameters| Parameters { reflection_color: color, ..p };
+    for mu in [1.0f32, 0.6, 0.2, 0.05] {
+        let wo = outgoing(mu, 0.3);
+        let albedo = |p: Parameters| drawn_albedo(&bsdf(&p, &TABLES), wo, Transport::Importance, 64);
+        let mirror = albedo(tinted(Parameters { base_color: Rgb::ZERO, ..plastic(0.0, f32::INFINITY) }));
+        assert!((mirror - color).abs().max_element() < 1e-4, "{mu}: {mirror}");
+        let inside = (1.0 - (1.0 - mu * mu) / 2.25).sqrt();
+        let s = ((mu - 1.5 * inside) / (mu + 1.5 * inside)).powi(2);
+        let t = ((1.5 * mu - inside) / (1.5 * mu + inside)).powi(2);
+        let (reflected, glass) = (0.5 * (s + t), albedo(tinted(glass(0.0, 1.5))));
+        let expected = color * reflected + Rgb::splat(1.0 - reflected);
+        assert!((glass - expected).abs().max_element() < 2e-3, "{mu}: {glass} is not {expected}");
+    }
+}
+
+/// Without the light that facets scatter more than once, the albedo of a perfect reflector is E. The lobe that is left
+/// out is (1 - E(o)) (1 - E(i)) / (pi (1 - E_avg)) [Kulla and Conty 2017].
+#[test]
+fn single_scattering_leaves_out_the_compensation() {
+    for alpha in [0.3, 0.6, 1.0] {
+        let [single, whole] =
+            [true, false].map(|single_scattering| bsdf(&Parameters { single_scattering, ..metal(alpha) }, &TABLES));
+        let lost = |mu: f32| 1.0 - drawn_albedo(&single, outgoing(mu, 0.3), Transport::Importance, 128).x;
+        let n = 64;
+        // The midpoint rule in mu^2, which is the cosine-weighted measure.
+        let average = (0..n).map(|k| lost(((k as f32 + 0.5) / n as f32).sqrt())).sum::<f32>() / n as f32;
+        assert!(average > 0.01, "{alpha}: {average}");
+        for (o, i) in [(1.0, 0.8), (0.7, 0.3), (0.4, 0.4)] {
+            let value =
+                |bsdf: &Bsdf| bsdf.eval(outgoing(o, 0.3), outgoing(i, 2.0), Transport::Radiance, LobeSet::ALL).x;
+            let (found, expected) = (value(&whole) - value(&single), lost(o) * lost(i) / (PI * average));
+            assert!((found - expected).abs() < 0.05 * expected + 1e-4, "{alpha}, {o}, {i}: {found} is not {expected}");
+            assert!((found - 1.2 * expected).abs() > 0.05 * expected + 1e-4, "an error of 20 % is not detected");
+        }
+    }
 }
 
 /// A mirror below a smooth coat of colour c reflects `(1 - E) c^(1 / cos)`, with the cosine of the refracted ray and

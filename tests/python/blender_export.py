@@ -172,11 +172,20 @@ class Export(unittest.TestCase):
         self.assertAlmostEqual(entry["pbrMetallicRoughness"]["roughnessFactor"], 0.4, 5)
 
     def test_dark_glossy_reflects_the_same_at_all_angles(self):
-        entry, warnings = self.material(node_material("m", "ShaderNodeBsdfGlossy", Color=(0.2, 0.2, 0.2, 1)))
+        for colour in ((0.2, 0.2, 0.2), (0.9, 0.4, 0.2)):
+            gloss = node_material("m", "ShaderNodeBsdfGlossy", Color=(*colour, 1), Roughness=0.4)
+            entry, warnings = self.material(gloss)
+            self.assertEqual(warnings, [])
+            self.assertEqual(entry["extensions"], {"KHR_materials_ior": {"ior": 0}})
+            numpy.testing.assert_allclose(entry["extras"]["caustique"]["reflection_color"], colour, rtol=1e-5)
+            self.assertEqual(entry["pbrMetallicRoughness"]["baseColorFactor"], [0, 0, 0, 1])
+            self.setUp()
+
+    def test_tinted_glass_reflects_its_tint(self):
+        entry, warnings = self.material(node_material("m", "ShaderNodeBsdfGlass", Color=(0.8, 0.4, 0.2, 1), IOR=1.5))
         self.assertEqual(warnings, [])
-        self.assertEqual(entry["extensions"]["KHR_materials_ior"], {"ior": 0})
-        self.assertAlmostEqual(entry["extensions"]["KHR_materials_specular"]["specularFactor"], 0.2, 5)
-        self.assertEqual(entry["pbrMetallicRoughness"]["baseColorFactor"], [0, 0, 0, 1])
+        numpy.testing.assert_allclose(entry["extras"]["caustique"]["reflection_color"], (0.8, 0.4, 0.2), rtol=1e-5)
+        self.assertNotIn("KHR_materials_specular", entry["extensions"])
 
     def test_sum_with_emission(self):
         material = node_material("e", "ShaderNodeBsdfDiffuse", "ShaderNodeEmission", mix="ShaderNodeAddShader", Color=(0.5, 0.25, 0.1, 1), Strength=8.0)

@@ -166,6 +166,8 @@ pub(super) struct MaterialExtras {
     pub(super) coat_color: Option<[f32; 3]>,
     pub(super) coat_color_texture: Option<Info>,
     pub(super) sheen_model: Sheen,
+    pub(super) reflection_color: Option<[f32; 3]>,
+    pub(super) single_scattering: bool,
 }
 
 /// Content of `extras.caustique` of a node with a mesh.
@@ -344,6 +346,8 @@ pub(super) const MATERIAL: &[&str] = &[
     "coat_color",
     "coat_color_texture",
     "sheen_model",
+    "reflection_color",
+    "single_scattering",
 ];
 pub(super) const CAMERA: &[&str] = &[
     "aperture_radius",

@@ -381,7 +381,7 @@ impl Reader<'_> {
         Ok(solid)
     }
 
-    /// Reads the keys of diffuse reflection, coat and sheen that glTF lacks.
+    /// Reads the keys of diffuse reflection, facets, coat and sheen that glTF lacks.
     fn own_layers(&mut self, material: &mut Material, own: &MaterialExtras) -> Result<()> {
         // With a texture, the factor is 1 unless the file has one, as for glTF's own factors.
         let rough = own.diffuse_roughness.unwrap_or(f32::from(u8::from(own.diffuse_roughness_texture.is_some())));
@@ -401,6 +401,10 @@ impl Reader<'_> {
             material.clearcoat_color.factor = self.color(color, 1.0, "extras.caustique.coat_color")?;
             material.tint_emission();
         }
+        if let Some(color) = own.reflection_color {
+            material.reflection_color = self.color(color, 1.0, "extras.caustique.reflection_color")?;
+        }
+        material.single_scattering = own.single_scattering;
         material.sheen_model = match own.sheen_model {
             extras::Sheen::Charlie => SheenModel::Charlie,
             extras::Sheen::Fibers => SheenModel::Fibers,
