@@ -105,9 +105,10 @@ mkdir -p "$tree/bin" "$tree/share/caustique/scenes"
 cp "$built/$program" "$tree/bin/"
 cp scenes/*.glb "$tree/share/caustique/scenes/"
 cp README.md CHANGELOG.md CITATION.cff "$notices/"
-# The program of this machine writes the manual; a package for Windows has none.
-native=$CARGO_TARGET_DIR/$(rustc -vV | sed -n 's/^host: //p')/release/caustique
-if [ "$system" != windows-x86_64 ] && [ -x "$native" ]; then
+# A program of this machine writes the manual; a package for Windows has none.
+if [ "$system" != windows-x86_64 ]; then
+    host=$(rustc -vV | sed -n 's/^host: //p') native=$CARGO_TARGET_DIR/$host/release/caustique
+    [ -x "$native" ] || env -u RUSTFLAGS cargo build --quiet --locked --release --target "$host" --bin caustique
     mkdir -p "$tree/share/man/man1" "$tree/share/zsh/site-functions" "$tree/share/bash-completion/completions" \
         "$tree/share/fish/vendor_completions.d"
     "$native" completions bash >"$tree/share/bash-completion/completions/caustique"

@@ -26,21 +26,15 @@ for tool in cc gcc clang cargo rustc; do
     check "no $tool here" no command -v "$tool"
 done
 check 'no other libraries here' no says 'embree|OpenImageDenoise|onnxruntime|libtbb' /sbin/ldconfig -p
-picture=(--width 160 --iterations 8 --seed 3 --denoise oidn --strict --progress none)
-small=(--width 64 --iterations 4 --progress none)
 
 # The tarball.
 start=$SECONDS
-mkdir "a place"
-tar -xzf "$packages"/caustique-*-linux-x86_64.tar.gz -C "a place"
-home=$(echo "$work/a place"/caustique-*)
-scene=$home/share/caustique/scenes/pool.glb
-check 'tarball: render' "$home/bin/caustique" render "$scene" -o tar.exr --png tar.png "${picture[@]}"
-first_picture tarball "$start"
-check 'tarball: pictures' holds tar.exr tar.png
+mkdir 'ein schöner Ort'
+tar -xzf "$packages"/caustique-*-linux-x86_64.tar.gz -C 'ein schöner Ort'
+home=$(echo "$work/ein schöner Ort"/caustique-*)
+test_program "$start" oidn "$home/share/caustique/scenes" "$home/bin/caustique"
 check 'tarball: its own libraries' uses_own "$home" "$home/bin/caustique"
 check 'tarball: doctor without USD' says 'Embree .*from package' "$home/bin/caustique" doctor
-check 'tarball: ONNX Runtime' "$home/bin/caustique" render "$scene" -o net.exr --model compact "${small[@]}"
 share=$home/share
 check 'tarball: manual' holds "$share"/man/man1/caustique{,-render,-plan,-serve}.1
 check 'tarball: licences' holds "$share"/doc/caustique/LICENSE-{MIT,APACHE} \
@@ -61,8 +55,7 @@ scene=$work/elsewhere/moved/share/caustique/scenes/pool.glb
 check 'wheel: render' venv/bin/caustique render "$scene" -o wheel.exr --png wheel.png "${picture[@]}"
 first_picture wheel "$start"
 check 'wheel: its own libraries' uses_own "$work/venv" venv/bin/caustique
-check 'wheel: the picture of the tarball' says '"relmse": 0\.0,' \
-    venv/bin/caustique compare wheel.exr tar.exr --json
+check 'wheel: the picture of the tarball' cmp wheel.exr pool.exr
 check 'wheel: licences' holds venv/lib/python3*/site-packages/caustique-*/licenses/{embree,oidn,tbb,onnxruntime,rust}.txt
 cat >render.py <<'PYTHON'
 import sys
@@ -78,6 +71,6 @@ check 'wheel: python -m' says '^Usage: caustique' venv/bin/python -m caustique -
 check 'wheel: pip install of USD' "${pip[@]}" "${wheel}[usd]"
 check 'wheel: USD' says 'USD +[0-9]+\.' venv/bin/caustique doctor
 stage=$(find "$ROOT/scenes/usd" -name '*.usda' | sort | sed -n 1p)
-check 'wheel: a USD stage' venv/bin/caustique render "$stage" -o usd.exr "${small[@]}"
+check 'wheel: a USD stage' venv/bin/caustique render "$stage" -o usd.exr --width 64 --iterations 4 --progress none
 
 report
