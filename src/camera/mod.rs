@@ -211,6 +211,12 @@ impl Camera {
         Camera { width, height, whole: Whole { corner, at, ..self.whole }, ..*self }
     }
 
+    /// A copy of this camera whose film is the whole picture.
+    pub fn uncropped(&self) -> Camera {
+        let Whole { size: (width, height), .. } = self.whole;
+        Camera { width, height, whole: Whole { corner: Vec2::ZERO, at: (0, 0), ..self.whole }, ..*self }
+    }
+
     /// A copy of this camera with `factor` times the pixels per side (at least one pixel), spread evenly over the film.
     /// Each covers the area of one pixel of this camera, so camera paths have the noise of single pixels. Light paths
     /// contribute from all of the film, so with proportionally fewer light paths their noise is that of the full

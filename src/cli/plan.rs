@@ -11,7 +11,6 @@ use caustique::pipeline::plan::{PlannedPicture, plan_picture};
 use caustique::pipeline::{Forecast, Loaded, forecast};
 use caustique::plan::{EffectPlan, Plan};
 use caustique::render::CONFIDENCE;
-use caustique::scene::View;
 use caustique::stop::Stop;
 use serde_json::json;
 
@@ -82,7 +81,7 @@ fn report(args: &PlanArgs) -> Result<()> {
 
 /// Forecasts the cost of rendering to the relative error `target`; `None` if it cannot be known.
 fn forecast_error(args: &PlanArgs, loaded: &Loaded, planned: &PlannedPicture, target: f64) -> Result<Option<Forecast>> {
-    let view = View::new(&loaded.scene, &planned.camera);
+    let view = planned.view(loaded);
     let settings =
         planned.chosen.settings.clone().with_light_paths(args.options.settings.photons, view.camera.whole()[0]);
     let mut finish = args.options.forecast_finish()?;
@@ -212,7 +211,7 @@ mod tests {
     use caustique::pipeline::plan::{self, PlanInput};
     use caustique::plan::switch::Removed;
     use caustique::render::{Candidate, Method, Settings};
-    use caustique::scene::{CameraRequest, Description, Scene};
+    use caustique::scene::{CameraRequest, Description, Scene, View};
 
     /// A column of figures exists if an effect has one, with dashes for the other effects.
     #[test]

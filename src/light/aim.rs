@@ -33,6 +33,7 @@ fn distance_to_line2(center: Vec3, p: Vec3, d: Vec3) -> f32 {
 }
 
 /// Caustic targets: the bounding spheres of the objects that can make caustics, towards which light paths start.
+#[derive(Clone)]
 pub struct CausticTargets {
     /// For each instance, its bounding sphere if it can make caustics.
     instances: Vec<Option<(Vec3, f32)>>,
@@ -299,8 +300,14 @@ mod tests {
         let choice = Cdf::new(areas.iter().map(|&a| f64::from(a)));
         let area = areas.iter().sum();
         let targets = CausticTargets { instances: Vec::new(), spheres, choice, area };
-        let sky =
-            Sky { center: Vec3::ZERO, radius: 1.05, environment: None, background: None, hidden_from_camera: false };
+        let sky = Sky {
+            center: Vec3::ZERO,
+            radius: 1.05,
+            environment: None,
+            background: None,
+            hidden_from_camera: false,
+            learnt: None,
+        };
         let d = Vec3::NEG_Y;
         let whole = PI * sky.radius * sky.radius;
         let n = 200_000u64;
@@ -366,6 +373,7 @@ mod tests {
                 environment: None,
                 background: None,
                 hidden_from_camera: false,
+                learnt: None,
             };
             let whole = PI * ratio * ratio;
             let region = Region::new(Vec3::new(-0.4, 0.2, 0.1) * ratio, 1.0, ratio);

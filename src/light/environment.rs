@@ -5,6 +5,7 @@ use crate::math::{Frame, Rgb, Vec2, Vec3, atan2_turns, luminance, sin_cos_turns,
 use rayon::prelude::*;
 use std::array::from_fn;
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Light that arrives from all directions at infinity.
@@ -39,6 +40,11 @@ const MAX_VARIANCE_RATIO: f64 = 0.5;
 const SHARE_SAMPLES: u32 = 1024;
 /// Number of patches in a strip.
 const PATCHES: usize = 4;
+/// Rows and columns of the sectors into which the sky is divided, see [`Sectors`].
+pub(super) const SECTOR_ROWS: usize = 12;
+pub(super) const SECTOR_COLUMNS: usize = 24;
+/// Number of sectors of the sky.
+pub(super) const SECTORS: usize = SECTOR_ROWS * SECTOR_COLUMNS;
 
 /// The texels of a row that the patches of a strip need, by channel; the next strip repeats the last one. Texels after
 /// the end of the row are those at its start. A strip fills one cache line.
@@ -77,6 +83,15 @@ struct Texels {
     row: usize,
     strips: Vec<Strip>,
     bands: Vec<Band>,
+}
+
+/// The sectors of an environment: a coarse grid of its directions. The sectors of an image are blocks of its bands and
+/// strips; those of a uniform environment have equal solid angles.
+pub(super) struct Sectors {
+    /// For each sector, the probability that [`Environment::sample`] samples a direction in it.
+    pub probabilities: Vec<f32>,
+    /// For each sector of an image, selects one of its bands; `None` for black sectors. Empty for a uniform environment.
+    bands: Vec<Option<Cdf>>,
 }
 
 /// A row of patches.
@@ -262,8 +277,8 @@ impl ImageEnvironment {
         Vec3::new(c * d.x + s * d.z, d.y, -s * d.x + c * d.z)
     }
 
-    /// Radiance from direction `d`, and the density with which `sample` draws it.
-    fn radiance_and_pdf_w(&self, d: Vec3) -> (Rgb, f32) {
+    /// Radiance from direction `d`, the density with which `sample` draws it, and its band and strip.
+    fn look_up(&self, d: Vec3) -> (Rgb, f32, [usize; 2]) {
         let (d, Texels { width, bands, .. }) = (self.to_image(d), &self.texels);
         let sin_theta = (d.x * d.x + d.z * d.z).sqrt();
         let v = 2.0 * atan2_turns(sin_theta, d.y);
@@ -277,22 +292,68 @@ impl ImageEnvironment {
         let at = Vec2::new(x - column as f32, (v - band.start) / band.height).clamp(Vec2::ZERO, Vec2::ONE);
         let patches = self.texels.patches(k, strip);
         let radiance = patches.radiance(patch, at);
-        let Some(columns) = &self.columns[k] else { return (radiance, 0.0) };
+        let Some(columns) = &self.columns[k] else { return (radiance, 0.0, [k, strip]) };
         let probability = self.rows.pdf(k) * columns.pdf(strip);
-        (radiance, self.texels.density(band, probability, patches.density(patch, at), sin_theta))
+        (radiance, self.texels.density(band, probability, patches.density(patch, at), sin_theta), [k, strip])
     }
 
     fn sample(&self, u: Vec2) -> Option<EnvironmentSample> {
         let (k, pdf_y, rest_y) = self.rows.sample(f64::from(u.x));
         let (strip, pdf_x, rest_x) = self.columns[k].as_ref()?.sample(f64::from(u.y));
+        Some(self.sample_strip(k, strip, pdf_y * pdf_x, Vec2::new(rest_x, rest_y)))
+    }
+
+    /// Samples a point of a strip of band `k` by the uniform point `u`. `probability` is that of the strip.
+    #[inline]
+    fn sample_strip(&self, k: usize, strip: usize, probability: f32, u: Vec2) -> EnvironmentSample {
         let (band, patches) = (&self.texels.bands[k], self.texels.patches(k, strip));
-        let (patch, at) = patches.sample(Vec2::new(rest_x, rest_y));
+        let (patch, at) = patches.sample(u);
         let (sin_theta, cos_theta) = sin_cos_turns(0.5 * (band.start + band.height * at.y));
         let x = (strip * PATCHES + patch) as f32 + 0.5 + at.x;
         let (sin_phi, cos_phi) = sin_cos_turns(x / self.texels.width as f32 - 0.5);
         let wi = self.to_world(Vec3::new(sin_theta * cos_phi, cos_theta, sin_theta * sin_phi));
-        let pdf_w = self.texels.density(band, pdf_y * pdf_x, patches.density(patch, at), sin_theta);
-        Some(EnvironmentSample { wi, pdf_w, radiance: patches.radiance(patch, at) })
+        let pdf_w = self.texels.density(band, probability, patches.density(patch, at), sin_theta);
+        EnvironmentSample { wi, pdf_w, radiance: patches.radiance(patch, at) }
+    }
+
+    /// The sector that contains a strip of a band.
+    #[inline]
+    fn sector(&self, [band, strip]: [usize; 2]) -> usize {
+        let row = band * SECTOR_ROWS / self.texels.bands.len();
+        row * SECTOR_COLUMNS + strip * SECTOR_COLUMNS / self.texels.row
+    }
+
+    /// The bands and the strips of a sector.
+    #[inline]
+    fn parts_of_sector(&self, sector: usize) -> [Range<usize>; 2] {
+        let part = |i: usize, parts: usize, all: usize| (i * all).div_ceil(parts)..((i + 1) * all).div_ceil(parts);
+        let bands = part(sector / SECTOR_COLUMNS, SECTOR_ROWS, self.texels.bands.len());
+        [bands, part(sector % SECTOR_COLUMNS, SECTOR_COLUMNS, self.texels.row)]
+    }
+
+    fn sectors(&self) -> Sectors {
+        let (mut probabilities, mut bands) = (Vec::with_capacity(SECTORS), Vec::with_capacity(SECTORS));
+        for sector in 0..SECTORS {
+            let [own, strips] = self.parts_of_sector(sector);
+            let within = |columns: &Cdf| columns.below(strips.end) - columns.below(strips.start);
+            let probability = |k: usize| f64::from(self.rows.pdf(k)) * self.columns[k].as_ref().map_or(0.0, within);
+            probabilities.push(own.clone().map(probability).sum::<f64>() as f32);
+            bands.push(Cdf::new(own.map(probability)));
+        }
+        Sectors { probabilities, bands }
+    }
+
+    /// Samples a direction in a sector by the uniform point `u`. Its density is that of `sample`, over all sectors.
+    #[inline]
+    fn sample_sector(&self, sectors: &Sectors, sector: usize, u: Vec2) -> Option<EnvironmentSample> {
+        let [bands, strips] = self.parts_of_sector(sector);
+        let (k, _, rest_y) = sectors.bands[sector].as_ref()?.sample(f64::from(u.x));
+        let k = bands.start + k;
+        let columns = self.columns[k].as_ref()?;
+        let [below, end] = [strips.start, strips.end].map(|strip| columns.below(strip));
+        let among = (below + f64::from(u.y) * (end - below)).min(end.next_down());
+        let (strip, pdf_x, rest_x) = columns.sample(among);
+        Some(self.sample_strip(k, strip, self.rows.pdf(k) * pdf_x, Vec2::new(rest_x, rest_y)))
     }
 }
 
@@ -310,6 +371,15 @@ impl Band {
             weights: [start, end].map(weight),
         }
     }
+}
+
+/// The sector of a uniform environment that contains a direction.
+#[inline]
+fn uniform_sector(d: Vec3) -> usize {
+    let row = ((0.5 - 0.5 * d.z) * SECTOR_ROWS as f32) as usize;
+    // Azimuths from -1/2 turn on; the remainder makes them start at 0.
+    let column = (atan2_turns(d.y, d.x) * SECTOR_COLUMNS as f32).floor() as i32;
+    row.min(SECTOR_ROWS - 1) * SECTOR_COLUMNS + column.rem_euclid(SECTOR_COLUMNS as i32) as usize
 }
 
 /// Radiance of an image averaged over all directions.
@@ -332,7 +402,45 @@ impl Environment {
     pub fn radiance_and_pdf_w(&self, d: Vec3) -> (Rgb, f32) {
         match self {
             Environment::Uniform(radiance) => (*radiance, 0.25 * FRAC_1_PI),
-            Environment::Image(image) => image.radiance_and_pdf_w(d),
+            Environment::Image(image) => {
+                let (radiance, pdf_w, _) = image.look_up(d);
+                (radiance, pdf_w)
+            }
+        }
+    }
+
+    /// [`Environment::radiance_and_pdf_w`], and the sector that contains the direction.
+    #[inline]
+    pub(super) fn look_up(&self, d: Vec3) -> (Rgb, f32, usize) {
+        match self {
+            Environment::Uniform(radiance) => (*radiance, 0.25 * FRAC_1_PI, uniform_sector(d)),
+            Environment::Image(image) => {
+                let (radiance, pdf_w, strip) = image.look_up(d);
+                (radiance, pdf_w, image.sector(strip))
+            }
+        }
+    }
+
+    /// Divides the directions into sectors.
+    pub(super) fn sectors(&self) -> Sectors {
+        match self {
+            Environment::Uniform(_) => {
+                Sectors { probabilities: vec![1.0 / SECTORS as f32; SECTORS], bands: Vec::new() }
+            }
+            Environment::Image(image) => image.sectors(),
+        }
+    }
+
+    /// Samples a direction in a sector by the uniform point `u`, with the density of [`Environment::sample`] over the
+    /// probability of the sector. The result holds the density of [`Environment::sample`].
+    #[inline]
+    pub(super) fn sample_sector(&self, sectors: &Sectors, sector: usize, u: Vec2) -> Option<EnvironmentSample> {
+        match self {
+            Environment::Uniform(_) => {
+                let (row, column) = ((sector / SECTOR_COLUMNS) as f32, (sector % SECTOR_COLUMNS) as f32);
+                self.sample(Vec2::new((row + u.x) / SECTOR_ROWS as f32, (column + u.y) / SECTOR_COLUMNS as f32))
+            }
+            Environment::Image(image) => image.sample_sector(sectors, sector, u),
         }
     }
 
@@ -363,6 +471,14 @@ impl Environment {
         self.sample(Vec2::new(((u.x - share) / (1.0 - share)).min(1.0f32.next_down()), u.y))
     }
 
+    /// Samples a direction as [`Environment::sample_at`] does, and returns it with the density of that.
+    #[inline]
+    pub(super) fn sample_with_density_at(&self, n: Vec3, u: Vec2) -> Option<(EnvironmentSample, f32)> {
+        let sample = self.sample_at(n, u)?;
+        let density = self.pdf_w_at(n, sample.wi, sample.pdf_w);
+        Some((sample, density))
+    }
+
     /// Density per solid angle with which [`Environment::sample_at`] samples the direction `d`, which
     /// [`Environment::sample`] samples with the density `pdf_w`.
     #[inline]
@@ -372,7 +488,7 @@ impl Environment {
 
     /// Share of the directions in next-event estimation at surfaces that are sampled by the cosine, which wastes none
     /// below the horizon. The rest is sampled by luminance.
-    fn cosine_share(&self) -> f32 {
+    pub(super) fn cosine_share(&self) -> f32 {
         match self {
             Environment::Uniform(_) => UNIFORM_SHARE,
             Environment::Image(image) => image.cosine,

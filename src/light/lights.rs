@@ -6,10 +6,12 @@ use super::bulb::crossed_share;
 use super::cdf::Cdf;
 use super::cone::Cone;
 use super::emission::{DirectSample, EmissionDensity, EmissionSample, EntryDisc};
+use super::environment::EnvironmentSample;
 use super::group::{Group, Groups};
 use super::kind::{
     Arrival, Emitter, EnvironmentLight, Light, LightRay, Owner, SceneParts, Selected, TriangleLight, VolumeLight,
 };
+use super::learnt_sky::LearntSky;
 use super::links::{LightLinks, LinkedObjects, Linking};
 use super::receiver::Receiver;
 use super::sampler::LightSampler;
@@ -25,6 +27,7 @@ use std::sync::Arc;
 const EQUAL_SHARE: f64 = 0.05;
 
 /// The lights of a scene, with the distributions that select them.
+#[derive(Clone)]
 pub struct Lights {
     emitters: Arc<[Emitter]>,
     choice: Option<Arc<LightSampler>>,
@@ -119,6 +122,13 @@ impl Lights {
     #[must_use]
     pub fn with_groups(self, groups: Groups) -> Lights {
         Lights { groups, ..self }
+    }
+
+    /// Replaces what is known about where light of the environment arrives.
+    #[must_use]
+    pub fn with_learnt_sky(self, learnt: Arc<LearntSky>) -> Lights {
+        let is_same = self.sky.environment.as_ref().is_some_and(|environment| learnt.is_of(environment));
+        Lights { sky: Sky { learnt: is_same.then_some(learnt), ..self.sky }, ..self }
     }
 
     /// Limits the light and the shadows of lights to some objects.
@@ -316,6 +326,14 @@ impl Lights {
         let mut sample = self.emitters[index].sample(&scene, receiver, selected, u)?;
         sample.arrival_factor *= self.choice()?.pdf(index) / probability;
         Some(sample)
+    }
+
+    /// Samples the environment for a receiver; `None` if there is none.
+    pub fn sample_environment(&self, receiver: &Receiver, u: Vec2) -> Option<DirectSample> {
+        let light = *self.infinite.first()?;
+        let (EnvironmentSample { wi, radiance, .. }, pdf_w) = self.sky.sample_at(receiver, u)?;
+        let selected = Selected { light, probability: self.choice.as_ref()?.pdf(receiver, light as usize) };
+        Some(selected.infinite(wi, radiance, pdf_w, false))
     }
 
     /// Density per area (1/m2) with which light paths from the sampled point or direction of a light arrive on a surface

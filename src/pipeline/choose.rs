@@ -22,17 +22,21 @@ pub struct Chosen {
     /// The comparison of candidates by `auto` in this run. `None` if the user names the method, or the options leave
     /// nothing to compare.
     pub choice: Option<Choice>,
+    /// Time to learn where light of the environment arrives, before the comparison.
+    pub learning: TimeSpent,
 }
 
 impl Chosen {
     /// Wraps settings that were not chosen among candidates.
     pub fn named(settings: Settings) -> Chosen {
-        Chosen { settings, candidate: None, choice: None }
+        Chosen { settings, candidate: None, choice: None, learning: TimeSpent::default() }
     }
 
-    /// Time that `auto` has taken to compare candidates in this run.
+    /// Time that was spent in this run before the render, to learn and to compare candidates.
     pub fn spent(&self) -> TimeSpent {
-        self.choice.as_ref().map(|choice| choice.spent).unwrap_or_default()
+        let mut spent = self.choice.as_ref().map(|choice| choice.spent).unwrap_or_default();
+        spent.add(self.learning);
+        spent
     }
 }
 
@@ -55,7 +59,8 @@ pub fn choose(
     };
     match choose::choose(view, settings_of, stop) {
         Some(choice) => {
-            Chosen { settings: choice.settings.clone(), candidate: Some(choice.candidate), choice: Some(choice) }
+            let (settings, candidate) = (choice.settings.clone(), Some(choice.candidate));
+            Chosen { candidate, choice: Some(choice), ..Chosen::named(settings) }
         }
         None => Chosen::named(checked),
     }
@@ -98,7 +103,7 @@ pub(super) fn chosen_before(
 ) -> Chosen {
     let candidate_of_auto = candidate.filter(|_| request.method.0.is_none());
     let settings = candidate_of_auto.and_then(|of| request.for_candidate(of, view.camera.whole()[0]));
-    Chosen { settings: settings.unwrap_or(checked), candidate, choice: None }
+    Chosen { candidate, ..Chosen::named(settings.unwrap_or(checked)) }
 }
 
 /// Fails if the user has stopped the render before its first iteration.

@@ -18,6 +18,7 @@ pub mod finish;
 mod finished_error;
 mod forecast;
 pub mod layers;
+pub mod learn;
 pub mod live;
 pub mod load;
 pub mod memory;
@@ -56,6 +57,8 @@ use crate::film::MOTION;
 use crate::render::{Motion, RenderInput, Rendered};
 use crate::scene::View;
 use check::Checked;
+use choose::Chosen;
+use learn::Learnt;
 use motion::{MovingScene, few_moments};
 use motion_vectors::motion_vectors;
 use observer::during;
@@ -88,10 +91,16 @@ pub fn render_loaded(mut request: Request, loaded: &Loaded, observer: &mut dyn O
     let middle = motion.as_ref().map(|motion| motion.at(0.5)).transpose()?;
     let seen = middle.as_ref().map_or(view, |(scene, camera)| View::new(scene, camera));
     let resumption = Resumption::read(&request, view.scene, &settings)?;
+    let learnt = Learnt::new(seen, &settings, &observer.stop());
+    let (scene, middle) = (learnt.scene(view.scene), middle.map(|(scene, camera)| (learnt.apply(scene), camera)));
+    let motion = motion.map(|motion| motion.with_learnt_sky(learnt.sky.clone()));
+    let view = View::new(scene.as_ref().unwrap_or(view.scene), &camera);
+    let seen = middle.as_ref().map_or(view, |(scene, camera)| View::new(scene, camera));
     let chosen = match &resumption.saved {
         Some((head, _)) => choose::chosen_before(&request.picture.settings, head.candidate, settings, seen),
         None => choose::choose_for_render(&request, settings, seen, observer)?,
     };
+    let chosen = Chosen { learning: learnt.spent, ..chosen };
     let planned = plan::plan_render(&request, &chosen, seen, &loaded.removed)?;
     drop(middle);
     let prepared = prepare::prepare(&request, planned, view, observer)?;

@@ -3,6 +3,7 @@
 use super::check::check_picture;
 use super::choose::{Chosen, choose};
 use super::layers;
+use super::learn::Learnt;
 use super::load::Loaded;
 use super::memory::MemoryCheck;
 use super::request::{PictureRequest, Request};
@@ -62,6 +63,15 @@ pub struct PlannedPicture {
     pub chosen: Chosen,
     /// The plan (effects and warnings), with the warnings of the scene in front.
     pub plan: Plan,
+    /// The scene with what was learnt about its light; `None` if nothing was.
+    learnt: Option<Scene>,
+}
+
+impl PlannedPicture {
+    /// The picture's view of the scene that was loaded.
+    pub fn view<'a>(&'a self, loaded: &'a Loaded) -> View<'a> {
+        View::new(self.learnt.as_ref().unwrap_or(&loaded.scene), &self.camera)
+    }
 }
 
 /// Checks, chooses and plans a picture as a render does, without rendering it. `path`: where the scene was read from.
@@ -71,14 +81,17 @@ pub struct PlannedPicture {
 pub fn plan_picture(picture: &PictureRequest, path: &Path, loaded: &Loaded, stop: &Stop) -> Result<PlannedPicture> {
     let Loaded { scene, removed, .. } = loaded;
     let checked = check_picture(picture, path, scene)?;
-    let view = View::new(scene, &checked.camera);
+    let learning = Learnt::new(View::new(scene, &checked.camera), &checked.settings, stop);
+    let learnt = learning.scene(scene);
+    let view = View::new(learnt.as_ref().unwrap_or(scene), &checked.camera);
     let finish = Some(DenoiserChoice::default());
     let memory = MemoryCheck { view, method: "auto", layers: &Selection::All, finish, limit: None };
     let chosen = choose(&picture.settings, checked.settings, view, memory.admits(), stop);
+    let chosen = Chosen { learning: learning.spent, ..chosen };
     let SettingsRequest { max_depth, switches, .. } = picture.settings;
     let mut plan = plan(PlanInput { chosen: &chosen, max_depth, switches }, view, removed);
     plan.warnings.splice(0..0, scene.warnings.iter().cloned());
-    Ok(PlannedPicture { camera: checked.camera, chosen, plan })
+    Ok(PlannedPicture { camera: checked.camera, chosen, plan, learnt })
 }
 
 /// The settings of a render, which fit into memory, and its plan (effects and warnings).

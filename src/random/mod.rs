@@ -39,6 +39,8 @@ pub enum Domain {
     GuideCamera = 8,
     /// Moments of the shutter interval at which iterations render a moving scene.
     Shutter = 9,
+    /// Camera paths that learn where light of the environment arrives.
+    SkyCamera = 10,
     /// Paths in unit tests.
     Test = 99,
 }

@@ -68,6 +68,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         hidden_from_camera: description.environment_hidden_from_camera || description.picture.film_transparent,
         environment: if background.is_some() { lighting.or(Some(Environment::Uniform(Rgb::ZERO))) } else { lighting },
         background,
+        learnt: None,
     };
     let others = description.lights.iter().filter(|light| !light.is_sphere());
     let mut distributions = Distributions::default();
@@ -85,7 +86,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         warnings
             .push("the scene has no camera: a three-quarter view of the whole scene is used (--orbit turns it)".into());
     }
-    let scattering = Scattering::new(&materials.list);
+    let scattering = Arc::new(Scattering::new(&materials.list));
     let contacts = Arc::new(Contacts::new(objects));
     warn_of_thin_walls(&shapes, &contacts, &mut warnings);
     let survey = Survey::new(objects, &lights, description.medium);
@@ -277,38 +278,23 @@ pub(super) fn rebuild_with_materials(
     };
     let catchers = catchers(&shapes, &materials, scene.lights.links(), rayon::current_num_threads())?;
     let others = scene.lights.others().cloned();
-    let sky = Sky { environment, ..scene.lights.sky().clone() };
+    let sky = Sky { environment, learnt: None, ..scene.lights.sky().clone() };
     let lights = Lights::new(objects, others.collect(), sky).with_groups(scene.lights.groups().clone());
     let lights = lights.with_links(scene.lights.links().clone());
     Ok(Scene {
-        source: scene.source.clone(),
-        files: scene.files.clone(),
-        converted: scene.converted.clone(),
-        origin: scene.origin,
-        objects: scene.objects.clone(),
-        first_light_sphere: scene.first_light_sphere,
-        preset_floor: scene.preset_floor,
         tracer,
         pass_through_lights,
         catchers,
-        light_names: scene.light_names.clone(),
-        guessed_units: scene.guessed_units.clone(),
-        environment_unknown: scene.environment_unknown,
-        contents: scene.contents.clone(),
-        cameras: scene.cameras.clone(),
-        picture: scene.picture,
-        shutter: scene.shutter,
         medium,
-        scattering: scene.scattering.for_materials(&materials.list),
+        scattering: Arc::new(scene.scattering.for_materials(&materials.list)),
         survey: Survey::new(objects, &lights, medium),
         contacts,
-        ranks: Arc::clone(&scene.ranks),
         alpha_solids: alpha_solids(objects).into(),
-        solid_stacks: SolidStacks::default(),
         warnings: Vec::new(),
         shapes,
         materials,
         lights,
+        ..scene.clone()
     })
 }
 

@@ -35,7 +35,7 @@ pub use view::View;
 
 use crate::error::Result;
 use crate::geometry::{ALL_LINKINGS, Shapes, Surface};
-use crate::light::{Environment, Light, Lights, Owner};
+use crate::light::{Environment, LearntSky, Light, Lights, Owner};
 use crate::material::{Materials, MediumParameters, Scattering};
 use crate::math::{DVec3, Vec3};
 use crate::trace::Tracer;
@@ -43,7 +43,8 @@ use description::{CameraDescription, FileContents, GuessedUnits, PictureDefaults
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// A validated, immutable scene with all data that rendering reads.
+/// A validated, immutable scene with all data that rendering reads. Clones share the large parts.
+#[derive(Clone)]
 pub struct Scene {
     /// Path of the scene file.
     pub source: PathBuf,
@@ -92,7 +93,7 @@ pub struct Scene {
     /// The medium that fills the space outside all solids; `None` if it is empty.
     pub medium: Option<MediumParameters>,
     /// Scattering data of the materials that were computed in advance.
-    pub scattering: Scattering,
+    pub scattering: Arc<Scattering>,
     /// Kinds of things that the scene contains, such as media and delta lights.
     pub survey: Survey,
     /// Triangles that other triangles may touch, where rays need to find all touching surfaces.
@@ -126,6 +127,12 @@ impl Scene {
     /// Embree is missing, or out of memory.
     pub fn build(description: Description, threads: usize) -> Result<Scene> {
         build::build(description, threads)
+    }
+
+    /// A copy of the scene that knows where light of its environment arrives.
+    #[must_use]
+    pub fn with_learnt_sky(&self, learnt: Arc<LearntSky>) -> Scene {
+        Scene { lights: self.lights.clone().with_learnt_sky(learnt), ..self.clone() }
     }
 
     /// A copy of the scene with other materials, medium and environment. The indices of refraction and the coatings of

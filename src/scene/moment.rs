@@ -4,7 +4,7 @@
 use super::dense::limit_densities;
 use super::description::{Description, PlacedMesh, missing_at_moments};
 use super::nesting::{Volumes, alpha_solids};
-use super::{Contacts, Scene, SolidStacks, Survey, build};
+use super::{Contacts, Scene, Survey, build};
 use crate::error::Result;
 use crate::geometry::{Instance, Mesh, Shapes};
 use crate::light::{Emitter, Sky};
@@ -84,23 +84,10 @@ impl<'a> MomentBuilder<'a> {
         let (tracer, pass_through_lights) = self.tracers(&shapes, &materials)?;
         let catchers = build::catchers(&shapes, &materials, lights.links(), rayon::current_num_threads())?;
         Ok(Scene {
-            source: scene.source.clone(),
-            files: scene.files.clone(),
-            converted: scene.converted.clone(),
-            origin: scene.origin,
-            objects: scene.objects.clone(),
-            first_light_sphere: scene.first_light_sphere,
-            preset_floor: scene.preset_floor,
             tracer,
             pass_through_lights,
             catchers,
-            light_names: scene.light_names.clone(),
-            guessed_units: scene.guessed_units.clone(),
-            environment_unknown: scene.environment_unknown,
-            contents: scene.contents.clone(),
             cameras: description.cameras,
-            picture: scene.picture,
-            shutter: scene.shutter,
             medium,
             scattering: self.scattering(&materials),
             survey: Survey::new(objects, &lights, medium),
@@ -110,11 +97,11 @@ impl<'a> MomentBuilder<'a> {
                 true => Arc::clone(&scene.alpha_solids),
                 false => alpha_solids(objects).into(),
             },
-            solid_stacks: SolidStacks::default(),
             warnings: Vec::new(),
             shapes,
             materials,
             lights,
+            ..scene.clone()
         })
     }
 
@@ -177,12 +164,12 @@ impl<'a> MomentBuilder<'a> {
     }
 
     /// The scattering of materials, with the tables of the frame if no index of refraction is new.
-    fn scattering(&self, materials: &Materials) -> Scattering {
+    fn scattering(&self, materials: &Materials) -> Arc<Scattering> {
         let own = &self.scene.materials.list;
-        match materials.list.iter().all(|material| own.iter().any(|known| known.ior == material.ior)) {
+        Arc::new(match materials.list.iter().all(|material| own.iter().any(|known| known.ior == material.ior)) {
             true => self.scene.scattering.for_materials(&materials.list),
             false => Scattering::new(&materials.list),
-        }
+        })
     }
 
     /// The bounding box of each instance, in world space.

@@ -175,6 +175,13 @@ pub struct SolidStacks {
     stacks: RwLock<Stacks>,
 }
 
+impl Clone for SolidStacks {
+    /// No stacks: paths enter them again.
+    fn clone(&self) -> SolidStacks {
+        SolidStacks::default()
+    }
+}
+
 #[derive(Default)]
 struct Stacks {
     list: Vec<SolidStack>,

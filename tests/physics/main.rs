@@ -45,3 +45,4 @@ mod splitting;
 mod stability;
 mod stopping;
 mod unseen;
+mod windows;

@@ -20,15 +20,18 @@ use caustique::medium::{FlightDensity, HenyeyGreenstein};
 use caustique::path_class::ClassSet;
 use caustique::photon::PhotonMap;
 use caustique::random::{Domain, Purpose, Stream};
+use caustique::render::{Settings, learn_sky};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
-use caustique::scene::{Description, Scene};
+use caustique::scene::{Description, Scene, View};
 use caustique::transport::bidirectional::mis::{self, Eta, Merges, MisState, Ratios, one_merge};
 use caustique::transport::{
     Bidirectional, CameraPathStart, CameraPaths, CameraWalkContext, Deposits, Indirect, InitialMedia, LightPaths,
     LightVertices, MediumVertex, MergeLevels, Next, PathRecorder, PathStart, PixelSample, SPARED_BY_ROULETTE,
     Scattered, Technique, TechniqueSet, Vertex, Visitor, lit_side, walk,
 };
-use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
+use support::scenes::{
+    add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square, window_room,
+};
 
 const SIZE: u32 = 16;
 const TOLERANCE: f64 = 1e-4;
@@ -867,6 +870,18 @@ fn lamp_under_an_environment() {
     let lamp = quad(Vec3::new(-0.8, 1.2, -0.6), Vec3::X * 0.6, Vec3::Z * 0.4);
     add(&mut description, "lamp", lamp, Material { double_sided: true, ..matte(0.2, 20.0) });
     check("lamp and environment", &build(description), 0.1, 4000);
+}
+
+/// In a room whose sky was learnt.
+#[test]
+fn behind_a_window() {
+    let mut description = window_room(matte(0.6, 0.0), outdoors().environment);
+    let lamp = quad(Vec3::new(-0.8, 0.8, -0.6), Vec3::X * 0.3, Vec3::Z * 0.2);
+    add(&mut description, "lamp", lamp, Material { double_sided: true, ..matte(0.2, 2.0) });
+    let scene = build(description);
+    let camera = scene.camera(&square(SIZE)).expect("a camera");
+    let learnt = learn_sky(View::new(&scene, &camera), &Settings::default()).expect("a window is worth learning");
+    check("window", &scene.with_learnt_sky(learnt), 0.1, 4000);
 }
 
 fn outdoors() -> Description {

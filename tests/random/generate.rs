@@ -7,7 +7,7 @@ use super::random::Random;
 use super::relation::similar;
 use super::shapes::{cuboid, disc, joined, lathe, prism, quad, sphere, triangle, vessel};
 use super::world::{Lens, Light, LightKind, Matter, Medium, Mesh, Placement, Texture, Thing, ThingKind, World};
-use glam::{DQuat, DVec3, EulerRot};
+use glam::{DQuat, DVec2, DVec3, EulerRot};
 use std::f64::consts::{PI, TAU};
 
 /// Radius of the empty space around a camera.
@@ -16,6 +16,8 @@ const CAMERA_SPACE: f64 = 0.08;
 const FIRST_WITH_ADDITIONS: u64 = 2000;
 /// First seed of scenes with light linking.
 const FIRST_WITH_LINKS: u64 = 3000;
+/// First seed of scenes with windows.
+const FIRST_WITH_WINDOWS: u64 = 4000;
 /// First seed of scenes with shadow linking.
 const FIRST_WITH_SHADOW_LINKS: u64 = 5000;
 /// Number of attempts to find a place for a thing.
@@ -54,6 +56,9 @@ pub fn generate(seed: u64) -> World {
         }
         if seed >= FIRST_WITH_SHADOW_LINKS && generator.random.chance(0.3) {
             generator.link(|thing| &mut thing.unblocked);
+        }
+        if seed >= FIRST_WITH_WINDOWS && generator.closed && generator.random.chance(0.4) {
+            generator.window();
         }
         generator.random = own;
     }
@@ -496,6 +501,43 @@ impl Generator {
                 *list(&mut self.world.things[index]) = unlinked;
             }
         }
+    }
+
+    /// Cuts a window into a wall that is a thing of its own, under a sky.
+    fn window(&mut self) {
+        let walls = self.world.things.iter().filter(|thing| thing.name.starts_with("wall")).filter_map(Thing::mesh);
+        let is_quad = |&mesh: &usize| self.world.meshes[mesh].positions.len() == 4;
+        let quads: Vec<usize> = walls.map(|(mesh, _)| mesh).filter(is_quad).collect();
+        if quads.is_empty() {
+            return;
+        }
+        let mesh = quads[self.random.below(quads.len())];
+        let wall = self.world.meshes[mesh].clone();
+        let [low, high] = [[0.1, 0.5], [0.55, 0.9]]
+            .map(|[from, to]| DVec2::new(self.random.within(from, to), self.random.within(from, to)));
+        // The corners of the wall are those of the unit square, in this order.
+        let at = DVec2::new;
+        let part = |low: DVec2, high: DVec2| {
+            let corners = [low, at(high.x, low.y), high, at(low.x, high.y)];
+            let [a, b, _, d] = [0, 1, 2, 3].map(|i| wall.positions[i]);
+            let [p, q, _, s] = [0, 1, 2, 3].map(|i| wall.uvs[i]);
+            Mesh {
+                positions: corners.map(|c| a + (b - a) * c.x + (d - a) * c.y).to_vec(),
+                uvs: corners.map(|c| p + (q - p) * c.x + (s - p) * c.y).to_vec(),
+                ..wall.clone()
+            }
+        };
+        self.world.meshes[mesh] = joined([
+            part(DVec2::ZERO, at(1.0, low.y)),
+            part(at(0.0, high.y), DVec2::ONE),
+            part(at(0.0, low.y), at(low.x, high.y)),
+            part(at(high.x, low.y), at(1.0, high.y)),
+        ]);
+        let things = self.world.things.iter_mut();
+        for thing in things.filter(|thing| thing.mesh().is_some_and(|(own, _)| own == mesh)) {
+            thing.name += " with a window";
+        }
+        self.world.sky = Some(self.color(0.5, 2.0));
     }
 
     /// Adds a solid that overlaps a floating one.

@@ -59,13 +59,22 @@ fn relations_hold() {
     check_relations(SCENES);
 }
 
+/// Rooms with windows, where renders learn from where light arrives.
+#[test]
+fn relations_hold_behind_windows() {
+    let has_window = |seed: &u64| generate(*seed).things.iter().any(|thing| thing.name.ends_with("with a window"));
+    let rooms: Vec<u64> = (4000..4100).filter(has_window).take(3).collect();
+    assert_eq!(rooms.len(), 3, "{rooms:?}");
+    check_relations(rooms);
+}
+
 #[test]
 #[ignore = "long"]
 fn relations_hold_in_more_scenes() {
     check_relations(MORE_SCENES);
 }
 
-fn check_relations(seeds: Range<u64>) {
+fn check_relations(seeds: impl IntoParallelIterator<Item = u64>) {
     let faults: Vec<String> = seeds
         .into_par_iter()
         .flat_map_iter(|seed| {

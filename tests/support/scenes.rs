@@ -6,7 +6,7 @@ use caustique::material::Material;
 use caustique::math::{DAffine3, DMat3, DVec3, Rgb, Vec3};
 use caustique::path_class::ClassSet;
 use caustique::scene::description::{
-    CameraDescription, Description, PlacedMesh, Projection, PunctualKind, PunctualLight,
+    CameraDescription, Description, EnvironmentDescription, PlacedMesh, Projection, PunctualKind, PunctualLight,
 };
 use caustique::scene::{CameraRequest, Scene};
 use caustique::transport::{CameraPaths, Indirect, InitialMedia};
@@ -198,4 +198,30 @@ pub fn glossy_balls() -> Description {
     add(&mut description, "narrow", sphere(Vec3::new(-0.45, 0.4, 0.0), 0.4, 64), metal(0.35.into()));
     add(&mut description, "wide", sphere(Vec3::new(0.45, 0.4, 0.3), 0.4, 64), metal(0.7.into()));
     description
+}
+
+/// A room from -1 to 1 in x and z, 1 m high, with a diffuse floor and with `walls`. The wall at x = 1 has a window, from
+/// 0.5 to 0.9 m and from -0.3 to 0.3 in z. The camera sees the floor from -0.5 to 0.5.
+pub fn window_room(walls: Material, sky: Option<EnvironmentDescription>) -> Description {
+    let mut room = Description { environment: sky, ..Description::default() };
+    let floor = quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0);
+    add(&mut room, "floor", floor, matte(0.8, 0.0));
+    let wall =
+        |x: [f32; 2], y: [f32; 2], z: [f32; 2]| cuboid(Vec3::new(x[0], y[0], z[0]), Vec3::new(x[1], y[1], z[1]), false);
+    let (all, side, window) = ([-1.0, 1.0], [0.0, 1.0], [1.0, 1.001]);
+    for (name, mesh) in [
+        ("ceiling", wall(all, [1.0, 1.1], all)),
+        ("left", wall([-1.1, -1.0], side, all)),
+        ("front", wall(all, side, [1.0, 1.1])),
+        ("back", wall(all, side, [-1.1, -1.0])),
+        ("below", wall(window, [0.0, 0.5], all)),
+        ("above", wall(window, [0.9, 1.0], all)),
+        ("before", wall(window, side, [0.3, 1.0])),
+        ("behind", wall(window, side, [-1.0, -0.3])),
+    ] {
+        add(&mut room, name, mesh, walls.clone());
+    }
+    let yfov = 2.0 * (0.5f32 / 0.95).atan().to_degrees();
+    room.cameras.push(look_at(DVec3::new(0.0, 0.95, 0.0), DVec3::ZERO, yfov));
+    room
 }

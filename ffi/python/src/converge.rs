@@ -14,10 +14,11 @@ use caustique::options::{RenderOptions, SceneOptions};
 use caustique::path_class::Effect;
 use caustique::pipeline::check::check_settings;
 use caustique::pipeline::choose::{Chosen, choose};
+use caustique::pipeline::learn::Learnt;
 use caustique::pipeline::plan::{self, PlanInput};
 use caustique::pipeline::{Loaded, OpenFinish, finish, memory};
 use caustique::plan::Presence;
-use caustique::render::{Control, Method, MethodChoice, Settings, SettingsRequest};
+use caustique::render::{Control, Method, MethodChoice, Settings, SettingsRequest, TimeSpent};
 use caustique::report::data;
 use caustique::report::entry::{Entry, Metric};
 use caustique::report::equal_time::{Participants, Rules, render_in_turns};
@@ -204,10 +205,13 @@ impl Comparison {
         for of in &settings {
             check_settings(of, scene.path, built)?;
         }
-        let (entries, mut finishes) = self.entries(scene, camera, settings, callback)?;
+        let learnt = Learnt::new(View::new(built, camera), &own, &callback.caller.stop());
+        let seen = learnt.scene(built);
+        let view = View::new(seen.as_ref().unwrap_or(built), camera);
+        let (entries, mut finishes) = self.entries(scene, view, settings, learnt.spent, callback)?;
         let denoisers = self.runs.iter().map(|run| (!run.options.no_finish).then_some(run.options.finish.denoise));
-        memory::check_all(View::new(built, camera), entries.iter().map(|entry| &entry.settings).zip(denoisers))?;
-        let reference = reference.unwrap_or_else(|| self.render_reference(own, View::new(built, camera), callback));
+        memory::check_all(view, entries.iter().map(|entry| &entry.settings).zip(denoisers))?;
+        let reference = reference.unwrap_or_else(|| self.render_reference(own, view, callback));
         let SettingsRequest { seed, iterations, .. } = self.common.settings;
         let rules = Rules {
             time: self.time(),
@@ -218,7 +222,6 @@ impl Comparison {
         };
         // Keeps the pictures of the runs until the errors are known.
         let folder = caustique::temporary::create_folder("caustique-")?;
-        let view = View::new(built, camera);
         let participants = Participants { entries: &entries, finishes: &mut finishes, peers: None };
         let mut outcome = render_in_turns(view, participants, &rules, &reference, folder.path(), |step| {
             callback.call(json!({
@@ -256,16 +259,17 @@ impl Comparison {
     fn entries(
         &self,
         scene: &Compared<'_>,
-        camera: &Camera,
+        view: View<'_>,
         settings: Vec<Settings>,
+        learning: TimeSpent,
         callback: &Callback<'_>,
     ) -> Result<(Vec<Entry>, Vec<Option<Finish>>)> {
-        let view = View::new(&scene.loaded.scene, camera);
         let (mut entries, mut finishes, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
         for (Run { name, options }, settings) in self.runs.iter().zip(settings) {
-            let settings = settings.with_light_paths(options.settings.photons, camera.size());
+            let settings = settings.with_light_paths(options.settings.photons, view.camera.size());
             let limited = SettingsRequest { time: self.time(), ..options.settings_request() };
             let chosen = choose(&limited, settings, view, |_| true, &callback.caller.stop());
+            let chosen = Chosen { learning, ..chosen };
             let decided = chosen.spent();
             let (max_depth, switches) = (self.common.settings.max_depth, scene.options.switches());
             let plan = plan::plan(PlanInput { chosen: &chosen, max_depth, switches }, view, &scene.loaded.removed);

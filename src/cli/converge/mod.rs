@@ -18,10 +18,11 @@ use caustique::finish::Finish;
 use caustique::image::tonemap::Look;
 use caustique::pipeline::check::check_settings;
 use caustique::pipeline::choose::{Chosen, choose};
+use caustique::pipeline::learn::Learnt;
 use caustique::pipeline::plan::{self, PlanInput};
 use caustique::pipeline::{Loaded, OpenFinish, memory};
 use caustique::plan::switch::Removed;
-use caustique::render::{Control, Settings};
+use caustique::render::{Control, Settings, TimeSpent};
 use caustique::report::crop::Window;
 use caustique::report::entry::Entry;
 use caustique::report::equal_time::{Participants, Rules, render_in_turns};
@@ -55,6 +56,9 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     files::check_inputs(args, &inputs)?;
     scene::print_warnings(&args.scene, &scene.warnings)?;
     let camera = scene.camera(&args.camera_request())?;
+    let shared = runs.first().map_or_else(Settings::default, |run| run.entry.settings.clone());
+    let learnt = Learnt::new(View::new(&scene, &camera), &shared, &Interrupt::stop());
+    let scene = learnt.apply(scene);
     let view = View::new(&scene, &camera);
     let windows = windows(args, &camera)?;
     for run in &runs {
@@ -64,7 +68,7 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
         })?;
     }
     let interrupt = Interrupt::install()?;
-    let runs = choose_all(args, runs, view)?;
+    let runs = choose_all(args, runs, view, learnt.spent)?;
     interrupt.check_before_first_iteration(&args.output)?;
     let denoiser = |run: &Run| (!run.args.no_finish).then_some(run.args.finish.denoise);
     memory::check_all(view, runs.iter().map(|(run, _)| (&run.entry.settings, denoiser(run))))?;
@@ -150,18 +154,18 @@ fn windows(args: &ConvergeArgs, camera: &Camera) -> Result<Vec<Window>> {
 }
 
 /// Settles the light paths of all runs, and the method of the runs by `auto`, with the limits of a run. Prints the
-/// choices.
-fn choose_all(args: &ConvergeArgs, runs: Vec<Run>, view: View<'_>) -> Result<Vec<(Run, Chosen)>> {
+/// choices. `learning`: time that all of them have spent before.
+fn choose_all(args: &ConvergeArgs, runs: Vec<Run>, view: View<'_>, learning: TimeSpent) -> Result<Vec<(Run, Chosen)>> {
     let choose_one = |mut run: Run| {
         let settings = run.entry.settings.clone().with_light_paths(run.request.photons, view.camera.whole()[0]);
         let chosen = {
             let work = || choose(&run.request, settings, view, |_| true, &Interrupt::stop());
-            args.progress.during("choosing a method", work)
+            Chosen { learning, ..args.progress.during("choosing a method", work) }
         };
         if let Some(choice) = &chosen.choice {
             say(&format!("run \"{}\": {}", run.entry.name, plan::reason(choice)));
-            run.entry.decided = choice.spent;
         }
+        run.entry.decided = chosen.spent();
         run.entry.settings = Settings { iterations: None, time: None, ..chosen.settings.clone() };
         Ok((run, chosen))
     };

@@ -59,9 +59,7 @@ impl Light for EnvironmentLight {
 
     #[inline]
     fn sample(&self, scene: &SceneParts, at: &Receiver, selected: Selected, u: Vec2) -> Option<DirectSample> {
-        let environment = scene.sky.environment.as_ref()?;
-        let EnvironmentSample { wi, pdf_w: start, radiance } = environment.sample_at(at.n, u)?;
-        let direct = environment.pdf_w_at(at.n, wi, start);
+        let (EnvironmentSample { wi, pdf_w: start, radiance }, direct) = scene.sky.sample_at(at, u)?;
         let mut sample = selected.infinite(wi, radiance, direct, false);
         sample.arrival_factor = start / direct;
         (sample.pdf_w > 0.0).then_some(sample)
@@ -86,13 +84,15 @@ impl Light for EnvironmentLight {
 
     #[inline]
     fn arriving(&self, sky: &Sky, at: &Receiver, d: Vec3, camera: bool) -> Option<Arrival> {
-        let environment = sky.environment.as_ref().filter(|_| !(camera && sky.hidden_from_camera))?;
+        if camera && sky.hidden_from_camera {
+            return None;
+        }
         if let Some(background) = sky.background.as_ref().filter(|_| camera) {
             // No other technique finds the light that a camera sees directly.
             let (radiance, _) = background.radiance_and_pdf_w(d);
             return Some(Arrival { radiance, direct: 1.0, start: 1.0 });
         }
-        let (radiance, start) = environment.radiance_and_pdf_w(d);
-        Some(Arrival { radiance, direct: environment.pdf_w_at(at.n, d, start), start })
+        let (radiance, direct, start) = sky.arriving(at, d)?;
+        Some(Arrival { radiance, direct, start })
     }
 }

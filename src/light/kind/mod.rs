@@ -84,7 +84,7 @@ impl Selected {
     /// The sample of a direction of a light at infinity, which has the density `pdf_w` per solid angle; 1 for a delta
     /// light.
     #[inline]
-    fn infinite(self, wi: Vec3, radiance: Rgb, pdf_w: f32, delta: bool) -> DirectSample {
+    pub(in crate::light) fn infinite(self, wi: Vec3, radiance: Rgb, pdf_w: f32, delta: bool) -> DirectSample {
         let pdf_w = self.probability * pdf_w;
         DirectSample { wi, target: None, radiance, pdf_w, delta, arrival_factor: 1.0, light: self.light }
     }

@@ -6,8 +6,9 @@ use crate::camera::Camera;
 use crate::estimator::{PixelAccumulator, QUARTERS};
 use crate::render::account::{Rendered, StopReason};
 use crate::render::input::RenderInput;
+use crate::render::pass::learn_sky;
 use crate::render::settings::Settings;
-use crate::scene::Scene;
+use crate::scene::{Scene, View};
 
 /// Iterations that an estimated error needs before it may stop a render: two in every quarter, whose spread gives the
 /// variance.
@@ -23,7 +24,8 @@ pub fn render(
     settings: &Settings,
     mut observe: impl FnMut(&Progress, &[PixelAccumulator]) -> Control,
 ) -> Rendered {
-    let input = RenderInput::new(scene, camera, settings);
+    let learnt = learn_sky(View::new(scene, camera), settings).map(|sky| scene.with_learnt_sky(sky));
+    let input = RenderInput::new(learnt.as_ref().unwrap_or(scene), camera, settings);
     let mut session = Session::new(&input);
     let stop = run_session(&mut session, |progress, session| observe(progress, session.pixels()));
     session.finish(stop)

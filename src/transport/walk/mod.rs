@@ -15,6 +15,7 @@ pub(in crate::transport) mod probe;
 pub(in crate::transport) mod roulette;
 pub(in crate::transport) mod scattering_vertex;
 pub(in crate::transport) mod segment;
+mod sky_samples;
 pub(in crate::transport) mod vertex;
 pub(in crate::transport) mod visible;
 
