@@ -48,7 +48,8 @@ size=(--width 160 --iterations 8)
 # the program renders without networks.
 test_program() {
     local scenes=$3 command=("${@:4}") small=(--width 32 --iterations 2 --progress none) name i
-    picture=("${size[@]}" --seed 3 --denoise "$2" --strict --progress none --reproducible)
+    # What guided light paths learn turns a hit that rounding changes into other light paths.
+    picture=("${size[@]}" --guide off --seed 3 --denoise "$2" --strict --progress none --reproducible)
 
     check 'render' "${command[@]}" render "$scenes/pool.glb" -o pool.exr --png pool.png "${picture[@]}"
     first_picture archive "$1"
