@@ -61,18 +61,10 @@ for library in 'Embree ' 'ONNX Runtime ' 'Open Image Denoise '; do
 done
 check 'info' says pool caustique info "$scenes/pool.glb"
 check 'plan' says caustic caustique plan "$scenes/pool.glb"
-differences=
-for scene in pool gems prism cornell; do
-    [ "$scene" = pool ] || check "render $scene" caustique render "$scenes/$scene.glb" -o "$scene.exr" "${picture[@]}"
-    check "Linux: $scene" "$native" render "$scenes/$scene.glb" -o "linux-$scene.exr" "${picture[@]}"
-    check "compare $scene" "$native" compare "$scene.exr" "linux-$scene.exr" --json
-    difference=$(sed -n 's/^  "relmse": \([^,]*\),*/\1/p' check.log)
-    bytes='other bytes'
-    ! cmp -s "$scene.exr" "linux-$scene.exr" || bytes='the same bytes'
-    notes+=("$scene: relMSE $difference from Linux's picture, $bytes")
-    differences+="\"$scene\": ${difference:-null}, "
-    check "same picture: $scene" python3 -c 'import sys; sys.exit(not float(sys.argv[1]) < 1e-4)' "${difference:-1}"
+for scene in "${compared[@]:1}"; do
+    check "render $scene" caustique render "$scenes/$scene.glb" -o "$scene.exr" "${picture[@]}"
 done
+compare_pictures "$scenes" "$native"
 for wheel in "$packages"/caustique-*-win_amd64.whl; do
     [ -e "$wheel" ] || continue
     python3 -m zipfile -e "$wheel" wheel
@@ -151,7 +143,7 @@ PYTHON
 notes+=("$ratio times the processor time of Linux's program")
 if [ -n "${CAUSTIQUE_STORE:-}" ]; then
     PYTHONPATH=$ROOT/scripts python3 -c 'import json, sys; from lab.record import record
-record("windows", json.loads(sys.argv[1]))' "{\"first_picture_seconds\": $first, \"relmse\": {${differences%, }},
+record("windows", json.loads(sys.argv[1]))' "{\"first_picture_seconds\": $first, \"relmse\": {$differences},
         \"zip_mib\": $(($(stat -c %s "$packages"/caustique-*-windows-x86_64.zip) >> 20)), \"processor_time_ratio\": $ratio}"
 fi
 report

@@ -179,10 +179,10 @@ impl LearntSky {
         (builder.learnt < MAX_TABLE_RATIO * builder.today).then_some(builder.sky)
     }
 
-    /// Whether the table was learnt under this environment.
+    /// Whether the table was learnt under this environment, whose light it returns.
     pub fn is_of(&self, environment: &Environment) -> bool {
         match (&self.environment, environment) {
-            (Environment::Uniform(_), Environment::Uniform(_)) => true,
+            (Environment::Uniform(own), Environment::Uniform(other)) => own == other,
             (Environment::Image(own), Environment::Image(other)) => std::sync::Arc::ptr_eq(own, other),
             _ => false,
         }

@@ -160,11 +160,7 @@ fn light_groups(description: &Description, first_light_sphere: u32, warnings: &m
             Group::NONE
         })
     };
-    let glows = |placed: &&description::PlacedMesh| {
-        let material = &description.materials[placed.material as usize];
-        // The sphere of a light that is dark at the frame shines at another moment.
-        placed.object >= first_light_sphere || material.emits() || material.medium_emission().is_some()
-    };
+    let glows = |placed: &&description::PlacedMesh| description.may_glow(placed, first_light_sphere);
     let instances: Vec<Group> = description
         .instances
         .iter()

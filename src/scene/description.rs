@@ -76,6 +76,14 @@ impl Description {
         self.shutter.filter(|_| self.animated)
     }
 
+    /// Whether an object may shine. With motion blur, one that is dark at the frame may do so at another moment. Objects
+    /// from `first_light_sphere` on are spheres made for point lights.
+    pub(super) fn may_glow(&self, placed: &PlacedMesh, first_light_sphere: u32) -> bool {
+        let material = &self.materials[placed.material as usize];
+        let glows = material.emits() || material.medium_emission().is_some();
+        glows || placed.object >= first_light_sphere || self.blur().is_some()
+    }
+
     /// World-space bounding box of all meshes, in f64. Without meshes, its lower corner is above the upper one.
     pub fn bounds(&self) -> (DVec3, DVec3) {
         bounding_box_f64(self.instances.iter().flat_map(|placed| {

@@ -45,12 +45,8 @@ pub(super) fn resolve<'d>(
     first_light_sphere: u32,
     warnings: &mut Vec<String>,
 ) -> Resolved {
-    let Description { instances, lights, materials, .. } = description;
-    // With motion blur, a mesh that is dark at the frame may shine at another moment.
-    let blurred = description.blur().is_some();
-    let glows = |placed: &PlacedMesh| {
-        blurred || placed.object >= first_light_sphere || materials[placed.material as usize].emits()
-    };
+    let Description { instances, lights, .. } = description;
+    let glows = |placed: &PlacedMesh| description.may_glow(placed, first_light_sphere);
     let surfaces = instances.iter().map(|placed| (&placed.name, placed.links.as_deref().filter(|_| glows(placed))));
     let others = lights.iter().filter(|light| !light.is_sphere()).map(|light| (&light.name, light.links.as_deref()));
     let sources = surfaces.chain(others);

@@ -4,13 +4,15 @@
 use crate::support;
 
 use caustique::film::output::names;
+use caustique::light::Group;
 use caustique::math::{DVec3, Rgb, Vec3};
 use caustique::render::output::layer_shape;
 use caustique::render::{Control, Levels, Method, Rendered, Settings, Shard, render};
 use caustique::scene::Scene;
 use caustique::scene::description::{
-    Description, EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight,
+    Description, EnvironmentDescription, EnvironmentSource, Linked, Links, PunctualKind, PunctualLight,
 };
+use std::sync::Arc;
 use support::scenes::{add, build, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 
 /// A floor with a ball of glass and a mirror, seen at an angle. An emissive panel is red, a sphere light and a spot are
@@ -122,5 +124,24 @@ fn shards_join_their_groups_too() {
     for ((pixel, other), whole) in joined.pixels.iter_mut().zip(other.pixels).zip(&whole.pixels) {
         pixel.join(other);
         assert!((0..3).all(|group| pixel.group(group) == whole.group(group)));
+    }
+}
+
+/// A panel that is dark at the frame keeps its group and its linking if it may shine at another moment.
+#[test]
+fn dark_panels_keep_their_group_and_linking_with_motion_blur() {
+    for animated in [false, true] {
+        let mut description = Description { shutter: Some([-0.5, 0.5]), animated, ..coloured() };
+        let floor = Links { collections: vec!["floor".into()], ..Links::default() };
+        let receivers = Linked { include: vec!["floor".into()], ..Linked::default() };
+        let panel = Links { receivers, ..Links::default() };
+        for (instance, links) in [(0, floor), (3, panel)] {
+            description.instances[instance].links = Some(Arc::new(links));
+        }
+        let material = description.instances[3].material as usize;
+        description.materials[material].emission = Rgb::ZERO;
+        let scene = build(description);
+        let kept = [scene.lights.object_group(3) != Group::NONE, !scene.lights.links().is_empty()];
+        assert_eq!(kept, [animated; 2]);
     }
 }

@@ -281,3 +281,15 @@ fn nothing_is_learnt_in_the_open() {
     let [uniform, ..] = environments();
     assert!(learn(&uniform, |_, _| true).is_none());
 }
+
+/// A table that was learnt under a sky of another brightness does not change the light of a scene.
+#[test]
+fn a_scene_keeps_the_light_of_its_own_sky() {
+    let brighter = sky().map(|sky| EnvironmentDescription { strength: 2.0, ..sky });
+    let [scene, other] = [sky(), brighter].map(|sky| build(window_room(matte(0.0, 0.0), sky)));
+    let learnt = learn_sky(View::new(&scene, &camera(&scene)), &settings(1, 0)).expect("a window is worth learning");
+    let mut found = Vec::new();
+    let (other, from) = (other.with_learnt_sky(learnt), Receiver::anywhere(Vec3::ZERO));
+    other.lights.for_each_infinite(&from, Vec3::Y, false, |radiance, _, _, _| found.push(radiance));
+    assert_eq!(found, [Rgb::splat(2.0)]);
+}

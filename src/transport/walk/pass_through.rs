@@ -63,15 +63,7 @@ pub(in crate::transport) fn for_each_pass_through_light(
                 }
                 return;
             }
-            let between = ShadowRay {
-                start: *start,
-                tmax: hit.t,
-                reaching: None,
-                in_medium: [from_medium, false],
-                destination: Destination::Any,
-                to_lens: false,
-            };
-            let visibility = shadow_ray(scene, &between);
+            let visibility = follow(scene, *start, hit.t, None, from_medium);
             if visibility.transmittance != Rgb::ZERO {
                 each(&surface, hit.t, visibility.transmittance, visibility.flight);
             }
@@ -91,29 +83,22 @@ fn linked_light(scene: &Scene, start: &Start, from_medium: bool, surface: &Surfa
     let to = target - start.origin;
     let tmax = to.length();
     let token = with_blockers(scene, start.token, light);
-    let between = ShadowRay {
-        start: Start { direction: to / tmax, token, ..*start },
-        tmax,
-        reaching: ContactPoint::on_light(scene, light, target),
-        in_medium: [from_medium, false],
-        destination: Destination::Any,
-        to_lens: false,
-    };
-    Some(shadow_ray(scene, &between)).filter(|visibility| visibility.transmittance != Rgb::ZERO)
+    let start = Start { direction: to / tmax, token, ..*start };
+    let visibility = follow(scene, start, tmax, ContactPoint::on_light(scene, light, target), from_medium);
+    (visibility.transmittance != Rgb::ZERO).then_some(visibility)
 }
 
 /// The shadow ray along a segment to a light at infinity; only the objects block it that block the light.
 pub(in crate::transport) fn to_infinity(scene: &Scene, segment: &Segment<'_>, light: u32) -> Visibility {
     let token = with_blockers(scene, segment.start.token, light);
-    let between = ShadowRay {
-        start: Start { token, ..*segment.start },
-        tmax: f32::INFINITY,
-        reaching: None,
-        in_medium: [segment.from_medium, false],
-        destination: Destination::Any,
-        to_lens: false,
-    };
-    shadow_ray(scene, &between)
+    follow(scene, Start { token, ..*segment.start }, f32::INFINITY, None, segment.from_medium)
+}
+
+/// Follows the shadow ray of a camera path's segment to a light at the distance `tmax`.
+#[inline]
+fn follow(scene: &Scene, start: Start, tmax: f32, reaching: Option<ContactPoint>, from_medium: bool) -> Visibility {
+    let (in_medium, destination) = ([from_medium, false], Destination::Any);
+    shadow_ray(scene, &ShadowRay { start, tmax, reaching, in_medium, destination, to_lens: false })
 }
 
 /// A segment of a camera path crosses the bulb of a light ([`crate::light::Bulb`]).
@@ -157,15 +142,8 @@ pub(in crate::transport) fn for_each_bulb(
     let reach = |light| if is_linked(light) { f32::INFINITY } else { view.reach };
     scene.lights.for_each_bulb(start.origin, start.direction, reach, camera, u, |radiance, distance, emitter| {
         let token = if is_linked(emitter) { with_blockers(scene, start.token, emitter) } else { start.token };
-        let between = ShadowRay {
-            start: Start { token, ..*start },
-            tmax: distance,
-            reaching: None,
-            in_medium: [from_medium, false],
-            destination: Destination::Any,
-            to_lens: false,
-        };
-        let light = radiance * shadow_ray(scene, &between).transmittance;
+        let seen = follow(scene, Start { token, ..*start }, distance, None, from_medium);
+        let light = radiance * seen.transmittance;
         if light != Rgb::ZERO {
             each(light, start.origin + start.direction * distance, emitter);
         }

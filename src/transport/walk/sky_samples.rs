@@ -11,8 +11,9 @@ use crate::random::Purpose;
 use crate::scene::Scene;
 use bumpalo::Bump;
 
-/// Number of samples at a vertex, and the second coordinate of a lattice of so many points.
+/// Number of samples at a vertex. They form a lattice.
 const SAMPLES: u32 = 8;
+/// Step of the second coordinate from one point of the lattice to the next, in units of the first coordinate's step.
 const LATTICE: u32 = 3;
 /// Largest number of segments of a path that learns. Later vertices are near earlier ones.
 const MAX_SEGMENTS: u32 = 6;
