@@ -114,10 +114,14 @@ join_beside() {
 
 without() { summary+=("$(printf '%-8s %-22s %s' 'not run' "$1" "$2")"); }
 
-setup test
+setup render
 cd "$ROOT"
+# The tests' Pythons are fetched while the program is built.
+setup test &
+fetched=$!
 CAUSTIQUE_BIN=$(realpath -m "${CARGO_TARGET_DIR:-target}/release/caustique")
 export CAUSTIQUE_BIN
+export RUSTC_WRAPPER=$ROOT/tests/rustc.sh
 
 if cargo fmt --version >/dev/null 2>&1; then
     part 'cargo fmt' cargo fmt --all --check
@@ -129,6 +133,7 @@ if [ "$verdict" != ok ]; then
     without 'all other parts' 'they need the build'
     exit 1
 fi
+wait "$fetched"
 # other_blenders [VARIABLE=VALUE]: the exporter in the oldest and the newest Blender
 other_blenders() {
     local which python

@@ -123,19 +123,20 @@ test_full_disk() {
 }
 
 # compare_pictures SCENES COMMAND...: compares the pictures of test_program with those of Linux's program, and keeps the
-# differences in `differences`, as pairs of JSON
+# differences in `differences`, as pairs of JSON. They omit the worst 0.5 % of the pixels: rounding decides on which side
+# of an edge a ray passes, and the facets of gems then send it elsewhere.
 compare_pictures() {
     local name difference bytes
     differences=
     for name in "${compared[@]}"; do
         check "Linux: $name" "${@:2}" render "$1/$name.glb" -o "linux-$name.exr" "${picture[@]}"
         check "compare $name" "${@:2}" compare "$name.exr" "linux-$name.exr" --json
-        difference=$(sed -n 's/^  "relmse": \([^,]*\),*/\1/p' check.log)
+        difference=$(sed -n 's/^  "relmse_trimmed": \([^,]*\),*/\1/p' check.log)
         bytes='other bytes'
         ! cmp -s "$name.exr" "linux-$name.exr" || bytes='the same bytes'
-        notes+=("$name: relMSE $difference from the picture of Linux on x86-64, $bytes")
+        notes+=("$name: trimmed relMSE $difference from the picture of Linux on x86-64, $bytes")
         differences+="\"$name\": ${difference:-null}, "
-        check "same picture: $name" python3 -c 'import sys; sys.exit(not float(sys.argv[1]) < 1e-4)' "${difference:-1}"
+        check "same picture: $name" python3 -c 'import sys; sys.exit(not float(sys.argv[1]) < 1e-6)' "${difference:-1}"
     done
     differences=${differences%, }
 }

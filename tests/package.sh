@@ -44,6 +44,8 @@ mkdir elsewhere
 mv "$home" elsewhere/moved
 ln -s "$work/elsewhere/moved/bin/caustique" linked
 check 'tarball: its own libraries after a move, by a link' uses_own "$work/elsewhere/moved" ./linked
+scene=$work/elsewhere/moved/share/caustique/scenes/pool.glb
+check 'tarball: render after a move' ./linked render "$scene" -o moved.exr --png moved.png "${picture[@]}"
 
 # The wheel.
 start=$SECONDS
@@ -51,11 +53,10 @@ python3 -m venv venv
 wheel=$(echo "$packages"/caustique-*_x86_64.whl)
 pip=(venv/bin/pip install -q --disable-pip-version-check)
 check 'wheel: pip install' "${pip[@]}" "$wheel"
-scene=$work/elsewhere/moved/share/caustique/scenes/pool.glb
 check 'wheel: render' venv/bin/caustique render "$scene" -o wheel.exr --png wheel.png "${picture[@]}"
 first_picture wheel "$start"
 check 'wheel: its own libraries' uses_own "$work/venv" venv/bin/caustique
-check 'wheel: the picture of the tarball' cmp wheel.exr pool.exr
+check 'wheel: the picture of the tarball' cmp wheel.exr moved.exr
 check 'wheel: licences' holds venv/lib/python3*/site-packages/caustique-*/licenses/{embree,oidn,tbb,onnxruntime,rust}.txt
 cat >render.py <<'PYTHON'
 import sys

@@ -256,7 +256,10 @@ impl Lights {
         let chosen = choice.pdf(receiver, index) / choice.power().pdf(index);
         match self.emitters[index].arriving(&self.sky, receiver, wi, false) {
             Some(Arrival { direct, start, .. }) if start > 0.0 => chosen * (direct / start),
-            _ => chosen,
+            _ => match &self.emitters[index] {
+                Emitter::Triangle(triangle) => chosen * triangle.relative_density_along(receiver, wi),
+                _ => chosen,
+            },
         }
     }
 
@@ -410,6 +413,7 @@ impl Lights {
         let radiance = materials.list[surface.material as usize].emitted(surface, &materials.textures) * relative;
         let choice = self.choice.as_ref()?;
         let [direct, start] = [choice.pdf(from, index), choice.power().pdf(index)].map(|chosen| chosen / triangle.area);
+        let direct = direct * triangle.relative_density(from, surface.p.distance_squared(from.p), cos);
         Some((radiance, EmissionDensity { direct, start, onward, cos, infinite: false, delta: false }))
     }
 

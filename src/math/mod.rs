@@ -4,6 +4,7 @@ mod angle;
 mod bounds;
 mod frame;
 mod rgb;
+mod spherical_triangle;
 pub mod warp;
 
 pub use angle::{atan2_turns, sin_cos_octant, sin_cos_turns};
@@ -11,6 +12,7 @@ pub use bounds::{bounding_box, bounding_box_f64, corners};
 pub use frame::{Frame, orthonormal_basis};
 pub use glam::{Affine3A, DAffine3, DMat3, DMat4, DVec2, DVec3, DVec4, Mat3, Mat3A, UVec2, Vec2, Vec3, Vec3A, Vec4};
 pub use rgb::{Rgb, is_lit, luminance};
+pub use spherical_triangle::SphericalTriangle;
 
 /// Square of a number.
 #[inline]

@@ -90,7 +90,7 @@ fn check(what: &str, photons: &[Vec<f64>], paths: &[Vec<f64>], bias: f64, plante
 #[test]
 fn glossy_room() {
     let scene = build(glossy_balls());
-    let paths = by_paths(&scene, 64, 10);
+    let paths = by_paths(&scene, 24, 10);
     for mode in INDIRECT_MODES {
         check(&format!("glossy room, {mode:?}"), &by_photons(&scene, mode, 20_000, 0.05, 8, 10), &paths, 0.015, 0.15);
     }
@@ -131,7 +131,7 @@ fn glass_room() {
     let rough = Material { roughness: 0.4.into(), ..glass(1.4) };
     add(&mut description, "rough", sphere(Vec3::new(0.45, 0.45, 0.3), 0.4, 64), rough);
     let scene = build(description);
-    let paths = by_paths(&scene, 128, 10);
+    let paths = by_paths(&scene, 64, 10);
     for mode in INDIRECT_MODES {
         check(&format!("glass room, {mode:?}"), &by_photons(&scene, mode, 40_000, 0.04, 8, 10), &paths, 0.02, 0.2);
     }

@@ -146,8 +146,8 @@ fn sphere_light_over_a_plane() {
     let expected = f64::from(rho * radiance * (radius / height).powi(2));
     // The polyhedron of 256 segments is smaller than the sphere by 3e-4.
     let check = Check { expected, bias: 1e-3, detects: 0.015 };
-    check.run(TESTS, "sphere light, photons", &by_photons(&scene, &settings(500, 0, 0.05), 8, 40)[0]);
-    check.run(TESTS, "sphere light, paths", &by_paths(&scene, 8, 500, 40));
+    check.run(TESTS, "sphere light, photons", &by_photons(&scene, &settings(150, 0, 0.05), 8, 40)[0]);
+    check.run(TESTS, "sphere light, paths", &by_paths(&scene, 8, 150, 40));
 }
 
 /// A point light beside an infinite mirror, over a plane, lights the plane like two lights.
@@ -194,7 +194,7 @@ fn sun_through_a_slab_seen_directly_and_through_a_slab() {
         let expected = f64::from(rho * e) / std::f64::consts::PI * transmitted.powi(slabs) / between.powi(2);
         // Ignoring a slab would change the result by 8 %.
         let check = Check { expected, bias: 4e-3, detects: if through { 0.06 } else { 0.03 } };
-        check.run(TESTS, what, &by_photons(&scene, &settings(4, 100_000, 0.25), 8, 20)[4]);
+        check.run(TESTS, what, &by_photons(&scene, &settings(4, 30_000, 0.25), 8, 20)[4]);
     }
 }
 
@@ -218,8 +218,8 @@ fn lamp_seen_through_absorbing_glass() {
     let a = f64::from(-sigma * depth).exp();
     let expected = f64::from(radiance) * (1.0 - f).powi(2) * a / (1.0 - f * f * a * a);
     let check = Check { expected, bias: 1e-4, detects: 0.015 };
-    check.run(TESTS, "absorbing slab, photons", &by_photons(&scene, &settings(1000, 0, 0.1), 8, 24)[0]);
-    check.run(TESTS, "absorbing slab, paths", &by_paths(&scene, 8, 1000, 24));
+    check.run(TESTS, "absorbing slab, photons", &by_photons(&scene, &settings(200, 0, 0.1), 8, 24)[0]);
+    check.run(TESTS, "absorbing slab, paths", &by_paths(&scene, 8, 200, 24));
 }
 
 /// A white diffuse sphere in clear glass under a uniform sky has the radiance of the sky. Photons cross the interface

@@ -218,7 +218,11 @@ fn look_alike(what: &str, scenes: &[Scene], methods: &[Method]) {
     let checks = methods.len() * (scenes.len() - 1);
     let critical = t_critical(sidak(ERROR_RATE, checks), 1, SEEDS as f64 - 1.0);
     for &method in methods {
-        let iterations = if method == Method::Sppm { 48 } else { 64 };
+        let iterations = match method {
+            Method::Path => 64,
+            Method::Sppm => 48,
+            _ => 16,
+        };
         let means: Vec<(f64, f64)> = scenes.iter().map(|scene| mean_of(scene, method, iterations)).collect();
         println!("{what}, {method:?}: {means:.5?}");
         let alike =

@@ -580,10 +580,10 @@ fn rough_dispersive_glass_agrees() {
     }
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 2.8), DVec3::new(0.0, 0.9, 0.0), 50.0));
     let scene = build(description);
-    let path = seeds(&scene, Method::Path, |seed| settings(150, seed));
-    let bdpt = seeds(&scene, Method::Bdpt, |seed| settings(40, seed));
+    let path = seeds(&scene, Method::Path, |seed| settings(40, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, |seed| settings(12, seed));
     agree("rough glass, bdpt", &bdpt, &path, 2e-3, 0.15);
-    let vcm = seeds(&scene, Method::Vcm, |seed| merging(60, seed));
+    let vcm = seeds(&scene, Method::Vcm, |seed| merging(24, seed));
     agree("rough glass, vcm", &vcm, &path, 0.02, 0.15);
     let sppm = seeds(&scene, Method::Sppm, |seed| photons(20_000, 0.05, 16, seed));
     agree("rough glass, sppm", &sppm, &path, 0.03, 0.2);
@@ -607,7 +607,7 @@ fn furnace() {
         for &method in &methods[..if roughness > 0.0 { 2 } else { 3 }] {
             let mut means: [Vec<f64>; 3] = Default::default();
             for seed in 0..10 {
-                let rendered = render(&scene, method, 8, &photons(100, 0.05, 300, seed));
+                let rendered = render(&scene, method, 8, &photons(100, 0.05, 100, seed));
                 for (c, means) in means.iter_mut().enumerate() {
                     means.push(rendered.pixels.iter().map(|p| p.mean(0)[c]).sum::<f64>() / 64.0);
                 }

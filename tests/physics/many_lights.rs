@@ -2,6 +2,7 @@
 
 use crate::support;
 
+use caustique::geometry::Surface;
 use caustique::light::{DirectSample, Light, Receiver};
 use caustique::math::{DVec3, Rgb, Vec3};
 use caustique::random::{Domain, Purpose, Stream};
@@ -102,4 +103,62 @@ fn irradiance_is_correct_and_near_lamps_are_sampled_most() {
     }
     println!("variance by power over that by what arrives: {least:.1} at least");
     assert!(least > 3.0, "the nearest lamps are not asked more often: {least}");
+}
+
+/// Points under, beside and at the edge of a large panel. Their irradiance is right, the densities of all techniques belong
+/// to one sampler, and sampling the solid angle divides the variance by three at least, up close.
+#[test]
+fn directions_to_near_panels_are_sampled() {
+    let mut description = Description::default();
+    let (corner, side) = (DVec3::new(-1.0, 1.0, -1.0), 2.0);
+    let panel = quad(corner.as_vec3(), Vec3::X * 2.0, Vec3::Z * 2.0);
+    add(&mut description, "panel", panel, matte(0.0, 1.0));
+    let scene = build(description);
+    let corners = [corner, corner + DVec3::X * side, corner + DVec3::new(side, 0.0, side), corner + DVec3::Z * side];
+    let n = 20_000;
+    let critical = t_critical(RATE, 16, n as f64);
+    let mut gains = Vec::new();
+    for k in 0..8u8 {
+        let height = [0.02, 0.1, 0.4, 1.0][usize::from(k % 4)];
+        let p = DVec3::new(1.3 * f64::from(k) / 8.0, 1.0 - height, -0.4 * f64::from(k) / 4.0);
+        let receiver = Receiver { n: Vec3::Y, ..Receiver::anywhere(p.as_vec3()) };
+        let by_area = Receiver { in_medium: true, ..receiver };
+        let variances = [(receiver, by_area), (by_area, receiver)].map(|(receiver, other)| {
+            let (mean, error) = mean_and_error(&estimates(&scene, &receiver, n, |_| 1.0));
+            let expected = polygon(p, &corners);
+            assert!((mean - expected).abs() < critical * error, "at {p}: {mean} +- {error}, expected {expected}");
+            // The planted bug: the density of the other sampler.
+            let planted = |light: &DirectSample| {
+                let ratio = |of: &Receiver| f64::from(scene.lights.next_event_ratio(of, light.light, light.wi));
+                ratio(&receiver) / ratio(&other)
+            };
+            let (wrong, wrong_error) = mean_and_error(&estimates(&scene, &receiver, n, planted));
+            let noticed = (wrong - expected).abs() > critical * wrong_error;
+            assert!(noticed || receiver.in_medium, "at {p}: another density is not detected");
+            error * error
+        });
+        if height < 0.5 {
+            gains.push(variances[1] / variances[0]);
+        }
+        for i in 0..200 {
+            let draws = Stream::new(12, 0, Domain::Test, i).vertex(1);
+            let (choice, u) = (draws.one_fine(Purpose::LightChoice), draws.two(Purpose::LightPoint));
+            let Some(light) = scene.lights.sample_direct(&scene.shapes, &scene.materials, &receiver, choice, u) else {
+                panic!("no light at {p}");
+            };
+            let (distance, cos) = (height as f32 / light.wi.y, light.wi.y);
+            let at = receiver.p + light.wi * distance;
+            let surface =
+                scene.shapes.surface(0, light.light, [0.3, 0.3]).map(|s| Surface { p: at, ..s }).expect("a panel");
+            let hit = scene.lights.hit_radiance(&scene.materials, &receiver, &surface, -light.wi).expect("light").1;
+            assert!((hit / light.pdf_w - 1.0).abs() < 2e-3, "at {p}: {hit} and {}", light.pdf_w);
+            // Light paths leave the panel by the cosine.
+            let arrival = scene.lights.arrival_pdf_a(&light, receiver.p)
+                * scene.lights.next_event_ratio(&receiver, light.light, light.wi);
+            let expected = cos / std::f32::consts::PI / (distance * distance);
+            assert!((arrival / expected - 1.0).abs() < 2e-3, "at {p}: {arrival}, expected {expected}");
+        }
+    }
+    println!("variance by area over that by solid angle: {gains:.1?}");
+    assert!(gains.iter().all(|&gain| gain > 3.0), "{gains:?}");
 }

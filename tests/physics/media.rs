@@ -312,9 +312,9 @@ fn subsurface_scattering_agrees() {
     );
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 1.9), DVec3::new(0.0, 0.6, 0.0), 55.0));
     let scene = build(description);
-    let path = seeds(&scene, Method::Path, 10, |seed| settings(60, seed));
+    let path = seeds(&scene, Method::Path, 10, |seed| settings(24, seed));
     for method in [Method::Bdpt, Method::Vcm] {
-        let other = seeds(&scene, method, 10, |seed| settings(20, seed));
+        let other = seeds(&scene, method, 10, |seed| settings(10, seed));
         agree(&format!("wax, {method:?}"), &other, &path, 0.01, 0.2);
     }
     let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(10_000, 0.06, 16, seed));
@@ -531,8 +531,8 @@ fn coloured_media_in_meshes_agree() {
     add(&mut description, "smoke", sphere(Vec3::new(0.45, 0.6, 0.2), 0.45, 48), holds(smoke));
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 1.9), DVec3::new(0.0, 0.7, 0.0), 55.0));
     let scene = build(description);
-    let path = seeds(&scene, Method::Path, 10, |seed| settings(80, seed));
-    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(25, seed));
+    let path = seeds(&scene, Method::Path, 10, |seed| settings(24, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(8, seed));
     agree("coloured media, bdpt", &bdpt, &path, 2e-3, 0.15);
     let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(10_000, 0.06, 16, seed));
     agree("coloured media, sppm", &sppm, &bdpt, 0.03, 0.3);

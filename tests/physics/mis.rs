@@ -678,18 +678,14 @@ impl<'a> Lab<'a> {
                         Some(target) => {
                             // The lamp is flat and has uniform radiance, but each of its triangles has its own
                             // probability.
-                            let lamp = emitters.iter().find_map(|emitter| match emitter {
-                                Emitter::Triangle(TriangleLight {
-                                    instance, primitive, corners: [a, b, c], ..
-                                }) => {
-                                    let (n, to) = (b.cross(*c), target - *a);
-                                    let x = to.cross(*c).dot(n) / n.length_squared();
-                                    let y = b.cross(to).dot(n) / n.length_squared();
-                                    let inside = x >= -1e-4 && y >= -1e-4 && x + y <= 1.0 + 1e-4;
-                                    inside.then(|| scene.shapes.surface(*instance, *primitive, [x, y])).flatten()
-                                }
-                                _ => None,
-                            });
+                            let Emitter::Triangle(TriangleLight { instance, primitive, corners: [a, b, c], .. }) =
+                                &emitters[sample.light as usize]
+                            else {
+                                panic!("another light than a lamp");
+                            };
+                            let (n, to) = (b.cross(*c), target - *a);
+                            let at = [to.cross(*c), b.cross(to)].map(|v| v.dot(n) / n.length_squared());
+                            let lamp = scene.shapes.surface(*instance, *primitive, at);
                             let lamp = lamp.expect("a lamp");
                             // Shadow rays end a little off the lamp, along its normal.
                             let p = target - lamp.ng * (target - lamp.p).dot(lamp.ng);

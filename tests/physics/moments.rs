@@ -18,7 +18,7 @@ use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, quad, s
 use support::stats::{Check, ERROR_RATE, mean_and_error, t_critical};
 
 const SIZE: u32 = 16;
-const ITERATIONS: u64 = 48;
+const ITERATIONS: u64 = 24;
 const SEEDS: u64 = 12;
 /// Largest relative difference between variances and predictions.
 const BIAS: f64 = 0.2;

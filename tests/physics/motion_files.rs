@@ -137,7 +137,7 @@ fn a_rotating_child_of_a_scaled_parent_is_blurred() {
     );
     let parent = file.node(json!({"name": "parent", "children": [child], "scale": [1.0, 1.0, 0.6]}));
     animate(&mut file, json!({"node": parent, "path": "rotation"}), [turned(-1.5), turned(1.5)]);
-    is_mean_of_stills("rotation", &file, Method::Path, 256, 0.005);
+    is_mean_of_stills("rotation", &file, Method::Path, 128, 0.005);
 }
 
 /// A scale that passes through zero thickness, where Embree cannot instance the mesh.
@@ -147,7 +147,7 @@ fn a_scaled_object_is_blurred() {
     let cube = file.cube("cube", Some(0));
     let node = file.node(json!({"name": "thing", "mesh": cube, "translation": [0.0, 0.5, 0.0]}));
     animate(&mut file, json!({"node": node, "path": "scale"}), [[0.2, 0.3, 1e-6], [1.2, 0.3, 0.8]]);
-    is_mean_of_stills("scale", &file, Method::Path, 256, 0.005);
+    is_mean_of_stills("scale", &file, Method::Path, 128, 0.005);
 }
 
 /// Two absorbing cubes of equal priority that overlap, one of which grows beyond the other while the shutter is open: the
@@ -165,7 +165,7 @@ fn the_smaller_of_two_solids_fills_the_space_at_each_moment() {
         file.node(json!({"name": name, "mesh": cube, "translation": translation, "scale": [0.5, 0.5, 0.5]}));
     }
     animate(&mut file, json!({"node": 3, "path": "scale"}), [[0.35; 3], [0.65; 3]]);
-    is_mean_of_stills("overlap", &file, Method::Path, 256, 0.005);
+    is_mean_of_stills("overlap", &file, Method::Path, 128, 0.005);
 }
 
 /// A lamp of finite size that is dark until the frame, in a scene without another light.
@@ -181,8 +181,8 @@ fn a_light_that_is_dark_at_the_frame_is_blurred() {
     // Each still would guess the unit from its own intensity.
     file.json["scenes"][0]["extras"] = json!({"caustique": {"light_units": "photometric"}});
     animate(&mut file, pointer("/extensions/KHR_lights_punctual/lights/0/intensity"), [[-9000.0], [9000.0]]);
-    is_mean_of_stills("dark light", &file, Method::Path, 256, 0.005);
-    is_mean_of_stills("dark light", &file, Method::Vcm, 256, 0.03);
+    is_mean_of_stills("dark light", &file, Method::Path, 128, 0.005);
+    is_mean_of_stills("dark light", &file, Method::Vcm, 128, 0.03);
 }
 
 #[test]
@@ -192,7 +192,7 @@ fn a_moving_camera_is_blurred() {
     file.node(json!({"name": "thing", "mesh": cube, "scale": [0.4, 0.4, 0.4]}));
     animate(&mut file, json!({"node": 2, "path": "translation"}), [[-1.0, 3.2, 3.4], [1.0, 3.0, 3.4]]);
     animate(&mut file, pointer("/cameras/0/perspective/yfov"), [[0.5], [0.9]]);
-    is_mean_of_stills("camera", &file, Method::Path, 256, 0.005);
+    is_mean_of_stills("camera", &file, Method::Path, 128, 0.005);
 }
 
 /// A lamp of finite size that moves and changes its power, and a material that changes its colour and its glow.
@@ -207,8 +207,8 @@ fn moving_lights_and_materials_are_blurred() {
     animate(&mut file, pointer("/materials/1/emissiveFactor"), [[0.2, 0.2, 0.2], [1.0, 0.0, 0.0]]);
     let color = "/materials/0/pbrMetallicRoughness/baseColorFactor";
     animate(&mut file, pointer(color), [[0.1, 0.9, 0.3, 1.0], [0.9, 0.1, 0.3, 1.0]]);
-    is_mean_of_stills("lights and materials", &file, Method::Path, 256, 0.005);
-    is_mean_of_stills("lights and materials", &file, Method::Vcm, 256, 0.03);
+    is_mean_of_stills("lights and materials", &file, Method::Path, 128, 0.005);
+    is_mean_of_stills("lights and materials", &file, Method::Vcm, 128, 0.03);
 }
 
 #[test]
@@ -239,7 +239,7 @@ fn morph_targets_and_skins_are_blurred() {
     file.push("skins", json!({"joints": [root, tip]}));
     file.node(json!({"name": "bar", "mesh": bar, "skin": 0}));
     animate(&mut file, json!({"node": tip, "path": "translation"}), [[-0.4, -0.2, -0.8], [0.2, 0.6, 0.8]]);
-    is_mean_of_stills("morph targets and skins", &file, Method::Path, 256, 0.005);
+    is_mean_of_stills("morph targets and skins", &file, Method::Path, 128, 0.005);
 }
 
 fn glass() -> Value {
@@ -256,8 +256,8 @@ fn a_glass_block_that_slides_on_the_floor_is_blurred() {
     let cube = file.cube("block", Some(glass));
     let node = file.node(json!({"name": "block", "mesh": cube, "scale": [0.4, 0.3, 0.4]}));
     animate(&mut file, json!({"node": node, "path": "translation"}), [[-1.4, 0.3, 0.2], [1.4, 0.3, 0.2]]);
-    is_mean_of_stills("glass", &file, Method::Vcm, 256, 0.03);
-    is_mean_of_stills("glass", &file, Method::Cppm, 256, 0.05);
+    is_mean_of_stills("glass", &file, Method::Vcm, 128, 0.03);
+    is_mean_of_stills("glass", &file, Method::Cppm, 128, 0.05);
 }
 
 #[test]
@@ -285,5 +285,5 @@ fn check_guided(method: Method, bias: f64) {
     let node = file.node(json!({"name": "block", "mesh": cube, "scale": [0.3, 0.3, 0.3]}));
     animate(&mut file, json!({"node": node, "path": "translation"}), [[-1.2, 0.6, 0.2], [1.2, 0.6, 0.2]]);
     let guided = |iterations, seed| Settings { guided: true, ..settings(method, iterations, seed) };
-    is_mean_of_stills_with("guided", &file, guided, 256, bias);
+    is_mean_of_stills_with("guided", &file, guided, 128, bias);
 }

@@ -5,11 +5,19 @@ use crate::geometry::{Shapes, Surface, offset_origin, shadow_end, triangle_error
 use crate::light::bounds::Bounds;
 use crate::light::{Cone, DirectSample, EmissionSample, Receiver, Sky, Spread};
 use crate::material::{Alpha, Objects};
-use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, luminance, warp};
+use crate::math::{Frame, Rgb, SphericalTriangle, Vec2, Vec3, Vec4, luminance, warp};
 use std::f32::consts::PI;
 
 /// Smallest cosine at which light paths leave a surface. At smaller ones, densities over the cosine overflow.
 const MIN_COSINE: f32 = 1e-6;
+
+/// Largest squared distance of a receiver from a triangle's centre, in units of its area, at which the solid angle is
+/// sampled. From farther away, points of the triangle contribute nearly alike.
+const NEAR: f32 = 16.0;
+/// Smallest solid angle (sr) that is sampled, and smallest squared height of the receiver over the triangle's plane in
+/// units of its area. Below, rounding decides about directions.
+const MIN_SOLID_ANGLE: f32 = 1e-3;
+const MIN_HEIGHT: f32 = 1e-6;
 
 /// A triangle of an emissive material, which emits light from one side or from both.
 #[derive(Clone, Debug, PartialEq)]
@@ -132,6 +140,49 @@ impl TriangleLight {
         Some((self.spread.relative_radiance(cos), self.cosine_density(cos), cos))
     }
 
+    /// The directions from a receiver to the triangle, if they are sampled instead of points of the triangle: from near,
+    /// and outside media, where points along a ray are sampled for a given point of a light.
+    #[inline]
+    fn directions(&self, receiver: &Receiver) -> Option<SphericalTriangle> {
+        let [corner, first, second] = self.corners;
+        let a = corner - receiver.p;
+        let height = self.normal().dot(receiver.p) - self.plane.w;
+        let is_far = (a + (first + second) / 3.0).length_squared() > NEAR * self.area;
+        if receiver.in_medium || is_far || height * height < MIN_HEIGHT * self.area {
+            return None;
+        }
+        let directions = SphericalTriangle::new([a, a + first, a + second], 2.0 * self.area * height)?;
+        (directions.solid_angle() >= MIN_SOLID_ANGLE).then_some(directions)
+    }
+
+    /// Density per area with which [`Light::sample`] samples a point of the triangle for a receiver, relative to a uniform
+    /// one. The point is at a squared distance, and the direction to it has the cosine `cos` to the normal.
+    #[inline]
+    pub(in crate::light) fn relative_density(&self, receiver: &Receiver, distance2: f32, cos: f32) -> f32 {
+        let of = |directions: SphericalTriangle| self.area * cos / (directions.solid_angle() * distance2);
+        self.directions(receiver).map_or(1.0, of)
+    }
+
+    /// [`TriangleLight::relative_density`] of the point in the unit direction `wi`.
+    #[inline]
+    pub(in crate::light) fn relative_density_along(&self, receiver: &Receiver, wi: Vec3) -> f32 {
+        let ng = self.normal();
+        let cos = ng.dot(wi);
+        let distance = (self.plane.w - ng.dot(receiver.p)) / cos;
+        self.relative_density(receiver, distance * distance, cos.abs())
+    }
+
+    /// Barycentric coordinates of the second and the third corner of the point in the unit direction `d` from `p`.
+    #[inline]
+    fn coordinates(&self, p: Vec3, d: Vec3) -> Vec2 {
+        let ([corner, first, second], ng) = (self.corners, self.normal());
+        let point = p + d * ((self.plane.w - ng.dot(p)) / ng.dot(d)) - corner;
+        let normal = first.cross(second);
+        let b = Vec2::new(normal.dot(point.cross(second)), normal.dot(first.cross(point))) / normal.length_squared();
+        let x = b.x.clamp(0.0, 1.0);
+        Vec2::new(x, b.y.clamp(0.0, 1.0 - x))
+    }
+
     /// Density per solid angle with which light paths leave in a direction of cosine `cos` to the normal.
     #[inline]
     fn cosine_density(&self, cos: f32) -> f32 {
@@ -197,7 +248,11 @@ impl Light for TriangleLight {
         if !self.two_sided && ng.dot(receiver.p) <= self.plane.w {
             return None;
         }
-        let b = warp::triangle_uniform(u);
+        let directions = self.directions(receiver);
+        let b = match &directions {
+            Some(directions) => self.coordinates(receiver.p, directions.sample(u)),
+            None => warp::triangle_uniform(u),
+        };
         let at = self.at(b);
         let to = at - receiver.p;
         let distance2 = to.length_squared();
@@ -211,8 +266,10 @@ impl Light for TriangleLight {
             return None;
         }
         let radiance = self.radiance_at(scene, b)? * relative;
-        let pdf_w = selected.probability * distance2 / (self.area * cos.abs());
-        let arrival_factor = self.cosine_density(cos.abs()) / distance2;
+        let uniform = distance2 / (self.area * cos.abs());
+        let density = directions.map_or(uniform, |directions| directions.solid_angle().recip());
+        let pdf_w = selected.probability * density;
+        let arrival_factor = self.cosine_density(cos.abs()) / distance2 * (uniform / density);
         let target = Some(shadow_end(at, ng, -wi, self.error, distance2.sqrt()));
         Some(DirectSample { wi, target, radiance, pdf_w, delta: false, arrival_factor, light: selected.light })
     }

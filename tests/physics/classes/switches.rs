@@ -189,9 +189,9 @@ fn every_class_has_the_same_light_by_every_method() {
     for effect in CLASSES {
         // Paths rarely hit the lights of caustics.
         let passes = match effect {
-            Effect::Caustic => 96,
-            Effect::Sds => 384,
-            _ => 24,
+            Effect::Caustic => 48,
+            Effect::Sds => 192,
+            _ => 12,
         };
         let paths = by(&scene, (Method::Path, Indirect::Photons), effect, passes, 0);
         assert!(average(&paths) > 1e-4, "{effect:?} is dark");
