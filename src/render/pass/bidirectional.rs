@@ -17,7 +17,7 @@ use super::light_cells::{LightCells, TracedPaths};
 use super::photon_counts::PhotonCounts;
 use super::sample_buffer::{self, SampleBuffer, SampleBufferPart};
 use super::techniques::{FilmRecorder, TechniquePicture, TileRecorder};
-use super::tiles::{BLOCK, PixelBlock, SlotPixel, TILE_PIXELS, Tiles, WholeTile};
+use super::tiles::{PixelBlock, SlotPixel, TILE_PIXELS, Tiles, WholeTile};
 use crate::camera::{GROUP_SIZE, TilePixel};
 use crate::estimator::{PixelAccumulator, Schedule, level_factor2};
 use crate::light::Guide;
@@ -293,21 +293,21 @@ impl<'a> LightTracer<'_, 'a> {
     {
         let Some(cell) = self.cells.starting_at(pixel) else { return };
         traced.start_cell(cell);
-        let wavelength = self.paths.wavelength(cell.first);
         for index in self.cells.paths(cell) {
             if let Some(mut emitted) = self.paths.emit(self.shared.camera_paths.scene, self.shared.initial_media, index)
             {
-                emitted.start.wavelength_sample = wavelength;
+                let wavelength = self.cells.wavelength_of_path(cell, index);
+                emitted.start.wavelength_sample = self.paths.wavelength(wavelength);
                 self.shared.light_path(self.paths, &emitted, self.photons_only, vertices, left, &mut ());
             }
             traced.end_path(vertices.len());
         }
     }
 
-    /// The wavelength of all paths of the cell of a pixel.
+    /// The wavelength of the camera path of a pixel.
     #[inline]
     fn wavelength(&self, pixel: SlotPixel) -> WavelengthSample {
-        self.paths.wavelength(self.cells.cell(pixel).first)
+        self.paths.wavelength(self.cells.wavelength_of_pixel(pixel))
     }
 }
 
@@ -351,10 +351,9 @@ impl Iteration<'_, '_> {
         left.clear();
         let tracer = LightTracer { shared, cells, paths: walks.light_paths, photons_only: false };
         let (mut arenas, mut traced) = ([Bump::new(), Bump::new()], TracedPaths::new());
-        let together = cells.slots_together(BLOCK);
         let whole_tile = Bump::new();
         let mut of_tile = LightVertices::new_in(&whole_tile);
-        if together.is_none() {
+        if !cells.are_pixels() {
             for pixel in tiles.blocks(tile).flat_map(|block| block.pixels) {
                 tracer.trace_cell_at(pixel, &mut of_tile, &mut traced, left);
             }
@@ -365,30 +364,25 @@ impl Iteration<'_, '_> {
             }
             let mut starts =
                 film.as_ref().map(|_| shared.camera_paths.starts(&places, walks.streams)).unwrap_or_default();
-            let step = together.unwrap_or(GROUP_SIZE);
-            for first in (0..GROUP_SIZE).step_by(step) {
+            for k in 0..GROUP_SIZE {
                 let [light_arena, camera_arena] = &mut arenas;
                 light_arena.reset();
-                let mut vertices = LightVertices::new_in(light_arena);
-                if together.is_some() {
+                let mut of_pixel = LightVertices::new_in(light_arena);
+                if cells.are_pixels() {
                     traced.clear();
-                    for pixel in &pixels[first..first + step] {
-                        tracer.trace_cell_at(*pixel, &mut vertices, &mut traced, left);
-                    }
+                    tracer.trace_cell_at(pixels[k], &mut of_pixel, &mut traced, left);
                 }
-                let vertices = if together.is_some() { &vertices } else { &of_tile };
-                for k in first..first + step {
-                    let (Some((samples, recorder)), Some(place), Some(start)) = (&mut film, &places[k], &mut starts[k])
-                    else {
-                        continue;
-                    };
-                    camera_arena.reset();
-                    let connected = &vertices[traced.connected(cells, pixels[k])];
-                    // All paths of a cell take one wavelength, so that they can be connected.
-                    start.ray.wavelength_sample = tracer.wavelength(pixels[k]);
-                    let sample = self.camera_path(walks, camera_arena, place, start, connected, *recorder);
-                    samples.set(place.at, &sample);
-                }
+                let vertices = if cells.are_pixels() { &of_pixel } else { &of_tile };
+                let (Some((samples, recorder)), Some(place), Some(start)) = (&mut film, &places[k], &mut starts[k])
+                else {
+                    continue;
+                };
+                camera_arena.reset();
+                let connected = &vertices[traced.connected(cells, pixels[k])];
+                // A camera path and the light paths of its group take one wavelength, so that they can be connected.
+                start.ray.wavelength_sample = tracer.wavelength(pixels[k]);
+                let sample = self.camera_path(walks, camera_arena, place, start, connected, *recorder);
+                samples.set(place.at, &sample);
             }
         }
     }

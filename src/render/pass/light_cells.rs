@@ -1,6 +1,9 @@
-//! Which light paths belong to which pixels. Pixels are grouped into cells, which are as small as whole numbers of light
-//! paths allow. The camera paths of a cell connect to light paths of their own cell, so that light vertices live only
+//! Which light paths belong to which pixels. Pixels are grouped into cells: single pixels, or whole tiles if pixels share
+//! light paths. The camera paths of a cell connect to light paths of their own cell, so that light vertices live only
 //! while a tile is rendered.
+//!
+//! Pixels that connect to the same light path have correlated noise, which denoisers take for texture if the pixels are
+//! neighbours. So the pixels of a tile that share light paths form a lattice, whose points are as far apart as possible.
 
 use super::tiles::{SlotPixel, TILE, TILE_PIXELS};
 use crate::render::settings::{Counts, LIGHT_PATH_STEPS};
@@ -9,12 +12,16 @@ use std::ops::Range;
 /// The cells of a picture. Tiles consist of whole cells.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LightCells {
-    /// Width and height of a cell (pixels), powers of two.
-    size: (u32, u32),
+    /// Side of a cell (pixels): 1, or that of a tile.
+    side: u32,
     /// Number of light paths of a cell.
     paths: u32,
     /// Number of light paths that each camera path connects to.
     connections: u32,
+    /// Number of groups of light paths of a cell; a camera path connects to one group.
+    groups: u32,
+    /// Number of groups by which the group of a pixel differs from that of the pixel above it.
+    shift: u32,
     /// Column and row of the first cell, and number of columns and rows.
     first: (u32, u32),
     extent: (u32, u32),
@@ -32,23 +39,15 @@ pub(super) struct Cell {
 impl LightCells {
     /// The cells of a window of the picture, given by the column and row of its first pixel and by its size.
     pub fn new(counts: Counts, at: (u32, u32), size: (u32, u32)) -> LightCells {
-        let (mut width, mut height) = (1, 1);
-        let paths = |area: u32| counts.light_paths * area / LIGHT_PATH_STEPS;
-        let is_whole = |area: u32| (counts.light_paths * area).is_multiple_of(LIGHT_PATH_STEPS);
-        while width * height < TILE * TILE
-            && !(is_whole(width * height) && paths(width * height) >= counts.connections.max(1))
-        {
-            if width == height { width *= 2 } else { height *= 2 }
-        }
-        let first = (at.0 / width, at.1 / height);
-        let extent = ((at.0 + size.0).div_ceil(width) - first.0, (at.1 + size.1).div_ceil(height) - first.1);
-        LightCells {
-            size: (width, height),
-            paths: paths(width * height),
-            connections: counts.connections,
-            first,
-            extent,
-        }
+        let of_pixel = counts.light_paths / LIGHT_PATH_STEPS;
+        let is_alone = counts.light_paths.is_multiple_of(LIGHT_PATH_STEPS) && of_pixel >= counts.connections.max(1);
+        let side = if is_alone { 1 } else { TILE };
+        let paths = counts.light_paths * side * side / LIGHT_PATH_STEPS;
+        let groups = (paths / counts.connections.max(1)).max(1);
+        let first = (at.0 / side, at.1 / side);
+        let extent = ((at.0 + size.0).div_ceil(side) - first.0, (at.1 + size.1).div_ceil(side) - first.1);
+        let shift = if is_alone { 0 } else { widest_lattice(groups) };
+        LightCells { side, paths, connections: counts.connections, groups, shift, first, extent }
     }
 
     /// Number of light paths of all cells.
@@ -56,37 +55,32 @@ impl LightCells {
         self.extent.0.saturating_mul(self.extent.1).saturating_mul(self.paths)
     }
 
-    /// Number of slots of a block of pixels whose light paths are traced together, before their camera paths: one if
-    /// every pixel has light paths of its own; `None` if cells are larger than blocks.
-    pub fn slots_together(&self, block: (u32, u32)) -> Option<usize> {
-        match self.size {
-            (1, 1) => Some(1),
-            (width, height) if width <= block.0 && height <= block.1 => Some((block.0 * block.1) as usize),
-            _ => None,
-        }
+    /// Whether every pixel has light paths of its own.
+    pub fn are_pixels(&self) -> bool {
+        self.side == 1
     }
 
     /// Index in its tile of the cell of a pixel.
     fn slot(&self, pixel: SlotPixel) -> usize {
-        let (x, y) = (pixel.x % TILE / self.size.0, pixel.y % TILE / self.size.1);
-        (y * (TILE / self.size.0) + x) as usize
+        let (x, y) = (pixel.x % TILE / self.side, pixel.y % TILE / self.side);
+        (y * (TILE / self.side) + x) as usize
     }
 
     /// The cell whose first pixel (top left) is this one; `None` if the pixel is not the first, or if the cell has no
     /// pixel in the window.
     pub fn starting_at(&self, pixel: SlotPixel) -> Option<Cell> {
-        let (width, height) = self.size;
-        let starts = pixel.x.is_multiple_of(width) && pixel.y.is_multiple_of(height);
+        let side = self.side;
+        let starts = pixel.x.is_multiple_of(side) && pixel.y.is_multiple_of(side);
         let columns = self.first.0..self.first.0 + self.extent.0;
         let rows = self.first.1..self.first.1 + self.extent.1;
-        let inside = columns.contains(&(pixel.x / width)) && rows.contains(&(pixel.y / height));
+        let inside = columns.contains(&(pixel.x / side)) && rows.contains(&(pixel.y / side));
         (starts && inside).then(|| self.cell(pixel))
     }
 
     /// The cell of a pixel in the window.
     #[inline]
     pub fn cell(&self, pixel: SlotPixel) -> Cell {
-        let (x, y) = (pixel.x / self.size.0 - self.first.0, pixel.y / self.size.1 - self.first.1);
+        let (x, y) = (pixel.x / self.side - self.first.0, pixel.y / self.side - self.first.1);
         Cell { slot: self.slot(pixel), first: (y * self.extent.0 + x) * self.paths }
     }
 
@@ -94,6 +88,38 @@ impl LightCells {
     pub fn paths(&self, cell: Cell) -> Range<u32> {
         cell.first..cell.first + self.paths
     }
+
+    /// Index in its cell of the first light path of the group that the camera path of a pixel connects to.
+    #[inline]
+    fn group_of(&self, pixel: SlotPixel) -> u32 {
+        let (x, y) = (pixel.x % self.side, pixel.y % self.side);
+        (x + y * self.shift) % self.groups * self.connections.max(1)
+    }
+
+    /// Index of the light path whose wavelength the camera path of a pixel takes, as all of its group do.
+    #[inline]
+    pub fn wavelength_of_pixel(&self, pixel: SlotPixel) -> u32 {
+        self.cell(pixel).first + self.group_of(pixel)
+    }
+
+    /// Index of the light path whose wavelength a light path of a cell takes.
+    #[inline]
+    pub fn wavelength_of_path(&self, cell: Cell, index: u32) -> u32 {
+        index - (index - cell.first) % self.connections.max(1)
+    }
+}
+
+/// The shift between rows for which the pixels of one of `groups` groups are farthest apart.
+fn widest_lattice(groups: u32) -> u32 {
+    let nearest = |shift: u32| {
+        let in_row = |y: u32| {
+            let x = y * shift % groups;
+            let x = x.min(groups - x);
+            x * x + y * y
+        };
+        (1..TILE).map(in_row).chain([groups * groups]).min()
+    };
+    (0..groups.min(TILE * TILE)).max_by_key(|&shift| nearest(shift)).unwrap_or(0)
 }
 
 /// Index of the light paths of a tile that have been traced so far, and of their vertices.
@@ -125,15 +151,12 @@ impl TracedPaths {
         self.ends.push(vertices);
     }
 
-    /// The vertices of the light paths that the camera path of a pixel connects to. Pixels of a cell share its light
-    /// paths evenly.
+    /// The vertices of the light paths that the camera path of a pixel connects to.
     pub fn connected(&self, cells: &LightCells, pixel: SlotPixel) -> Range<usize> {
         if cells.connections == 0 {
             return 0..0;
         }
-        let (width, height) = cells.size;
-        let order = pixel.y % height * width + pixel.x % width;
-        let first = (order * cells.paths / (width * height)).min(cells.paths - cells.connections);
+        let first = cells.group_of(pixel);
         let first = self.before[cells.slot(pixel)] + first as usize;
         let start = if first == 0 { 0 } else { self.ends[first - 1] };
         start..self.ends[first + cells.connections as usize - 1]
@@ -180,11 +203,33 @@ mod tests {
         }
     }
 
+    /// Pixels that share light paths are at least as far apart as squares of their share of the tile are wide, nearly.
+    #[test]
+    fn neighbours_share_no_light_paths() {
+        assert_eq!(LightCells::new(Counts::PATHS, (0, 0), (TILE, TILE)).group_of(SlotPixel { x: 3, y: 2 }), 0);
+        let counts = [(4, 2, 32), (8, 1, 137), (1, 1, 16), (4, 1, 65), (1, 2, 8), (16, 2, 137)];
+        for (light_paths, connections, apart2) in counts {
+            let cells = LightCells::new(Counts { light_paths, connections, merging: 1.0 }, (0, 0), (TILE, TILE));
+            for group in 0..cells.groups {
+                let pixels = (0..TILE).flat_map(|y| (0..TILE).map(move |x| SlotPixel { x, y }));
+                let of_group: Vec<SlotPixel> =
+                    pixels.filter(|&pixel| cells.group_of(pixel) == group * connections).collect();
+                assert!(!of_group.is_empty());
+                for (i, a) in of_group.iter().enumerate() {
+                    for b in &of_group[..i] {
+                        let distance2 = a.x.abs_diff(b.x).pow(2) + a.y.abs_diff(b.y).pow(2);
+                        assert!(distance2 >= apart2, "{light_paths} {connections}: {distance2}");
+                    }
+                }
+            }
+        }
+    }
+
     /// By default light path number i starts for pixel number i, row by row.
     #[test]
     fn by_default_every_pixel_has_its_own_light_path() {
         let cells = LightCells::new(Counts::default(), (13, 7), (40, 43));
-        assert_eq!((cells.count(), cells.slots_together((4, 2))), (40 * 43, Some(1)));
+        assert_eq!((cells.count(), cells.are_pixels()), (40 * 43, true));
         let cell = cells.starting_at(SlotPixel { x: 13 + 5, y: 7 + 2 }).unwrap();
         assert_eq!(cell.first, 2 * 40 + 5);
         assert!(cells.starting_at(SlotPixel { x: 12, y: 7 }).is_none());

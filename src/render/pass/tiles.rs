@@ -30,7 +30,7 @@ pub(super) struct WholeTile {
 }
 
 /// Width and height of a block of pixels.
-pub(super) const BLOCK: (u32, u32) = (GROUP_SIZE as u32 / 2, 2);
+const BLOCK: (u32, u32) = (GROUP_SIZE as u32 / 2, 2);
 
 /// Column and row of a slot of a tile in the whole picture. It may lie outside the picture.
 #[derive(Clone, Copy, Debug)]
