@@ -1,19 +1,16 @@
-"""A new Blender that opens a .blend with the add-on, renders it once, and prints the seconds since its start as JSON:
+"""A new Blender that opens a .blend with the add-on, renders it once, and prints the seconds since the opening as JSON:
 blender_session.py f12|viewport PROGRAM BLEND ITERATIONS WIDTH HEIGHT."""
 
+import json
+import os
+import sys
+import tempfile
 import time
+from pathlib import Path
 
-START = time.monotonic()
+import bpy
 
-import json  # noqa: E402  the clock starts first
-import os  # noqa: E402
-import sys  # noqa: E402
-import tempfile  # noqa: E402
-from pathlib import Path  # noqa: E402
-
-import bpy  # noqa: E402
-
-import package  # noqa: E402
+import package
 
 REPOSITORY = "caustique_session"
 ADDON = f"bl_ext.{REPOSITORY}.caustique"
@@ -30,7 +27,7 @@ def install(folder, program):
     bpy.context.preferences.addons[ADDON].preferences.program = program
 
 
-def viewport(scene, size, iterations):
+def viewport(scene, size, iterations, start):
     """Seconds of the first coarse picture, and of the last iteration's."""
     module, times = sys.modules[f"{ADDON}.viewport"], {}
     view, camera = module.Viewport(scene, scene.view_layers[0]), scene.camera
@@ -38,14 +35,14 @@ def viewport(scene, size, iterations):
     view.update(depsgraph)
     view.want(camera.matrix_world.inverted(), camera.calc_matrix_camera(depsgraph, x=size[0], y=size[1]), 0.0, size)
     while "finished" not in times:
-        if view._live.fault or time.monotonic() - START > PATIENCE_SECONDS:
+        if view._live.fault or time.monotonic() - start > PATIENCE_SECONDS:
             raise SystemExit(f"the viewport shows no picture: {view._live.fault}")
         view.tick()
         if view.is_current():
             about = view._live.picture.about
-            times.setdefault("coarse", time.monotonic() - START)
+            times.setdefault("coarse", time.monotonic() - start)
             if about["iteration"] >= iterations and not about["coarse"]:
-                times["finished"] = time.monotonic() - START
+                times["finished"] = time.monotonic() - start
         time.sleep(0.005)
     view.close()
     return times
@@ -54,7 +51,7 @@ def viewport(scene, size, iterations):
 def main(path, program, blend, iterations, width, height):
     with tempfile.TemporaryDirectory() as folder:
         install(folder, program)
-        installed = time.monotonic()
+        start = time.monotonic()
         bpy.ops.wm.open_mainfile(filepath=blend)
         scene, size = bpy.context.scene, (int(width), int(height))
         scene.render.engine, scene.render.resolution_percentage = "CAUSTIQUE", 100
@@ -63,15 +60,13 @@ def main(path, program, blend, iterations, width, height):
         scene.render.filepath = str(Path(folder) / "picture.png")
         times = {}
         if path == "viewport":
-            times = viewport(scene, size, int(iterations))
+            times = viewport(scene, size, int(iterations), start)
         else:
             bpy.ops.render.render(write_still=True)
             if not Path(scene.render.filepath).exists():
                 raise SystemExit("F12 wrote no picture")
-            times["finished"] = time.monotonic() - START
-        # Installing is done once, before a user's work.
-        spent = installed - START
-        print(json.dumps({name: round(at - spent, 2) for name, at in times.items()}), flush=True)
+            times["finished"] = time.monotonic() - start
+        print(json.dumps({name: round(seconds, 2) for name, seconds in times.items()}), flush=True)
     # Blender as a module may hang while it shuts down.
     os._exit(0)
 

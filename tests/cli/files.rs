@@ -262,16 +262,16 @@ fn small_pictures_have_few_guided_light_paths() {
     }
 }
 
-/// The number of light paths per pixel is a multiple of a sixteenth. Without light paths the method is `path`, without
-/// merging `bdpt`; options that would have no effect are refused.
+/// The number of light paths per pixel is a multiple of a sixteenth, in whole tiles. Without light paths the method is
+/// `path`, without merging `bdpt`; options that would have no effect are refused.
 #[test]
 fn numbers_of_light_paths_connections_and_merges_are_options() {
     let folder = Folder::new();
-    let vcm = "render scene.glb --width 48 --height 36 --iterations 1 --no-finish --progress none --method vcm";
+    let vcm = "render scene.glb --width 48 --height 32 --iterations 1 --no-finish --progress none --method vcm";
     for (options, method, paths) in [
-        ("--light-paths 2", "vcm", 2 * 48 * 36),
-        ("--light-paths 0.0625 --connections 0 --merging 0.5", "vcm", 48 * 36 / 16),
-        ("--light-paths 0.25 --merging 0", "bdpt", 48 * 36 / 4),
+        ("--light-paths 2", "vcm", 2 * 48 * 32),
+        ("--light-paths 0.0625 --connections 0 --merging 0.5", "vcm", 48 * 32 / 16),
+        ("--light-paths 0.25 --merging 0", "bdpt", 48 * 32 / 4),
         ("--light-paths 0", "path", 0),
     ] {
         let outcome = folder.run(&format!("{vcm} {options} -o out.exr"));
