@@ -17,7 +17,7 @@ impl SphericalTriangle {
     pub fn new(offsets: [Vec3; 3], six_volume: f32) -> Option<SphericalTriangle> {
         let lengths = offsets.map(Vec3::length);
         let product: f32 = lengths.iter().product();
-        if !(product > 0.0) {
+        if product == 0.0 {
             return None;
         }
         let corners: [Vec3; 3] = std::array::from_fn(|i| offsets[i] / lengths[i]);
