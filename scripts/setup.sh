@@ -247,7 +247,9 @@ need_venv() {
     say "making $1 from $3"
     "$python" -I -m venv --clear "$directory" ||
         fail "$python could not make the virtual environment $1" "check that the disk has room"
-    "$directory/bin/python" -I -m pip install -q --disable-pip-version-check --require-hashes -r "$requirements" >&2 ||
+    # Python compiles the few modules that it imports; compiling all of them takes minutes.
+    "$directory/bin/python" -I -m pip install -q --no-compile --disable-pip-version-check --require-hashes \
+        -r "$requirements" >&2 ||
         fail "pip could not install what scripts/$3 lists" "check the network and the disk, then run this script again"
     printf '%s\n' "$stamp" >"$directory/.complete"
 }

@@ -40,8 +40,9 @@ const MAX_POORLY_SAMPLED: f64 = 0.02;
 const LIGHT_PATHS: [u32; 7] = [1, 2, 4, 8, 16, 32, 64];
 /// Numbers of connections that are compared.
 const CONNECTIONS: [u32; 4] = [0, 1, 2, 4];
-/// Core-seconds that one second of the time limit `--time` counts as, on every machine. It is small, so that on most
-/// machines pilots take less than their share; on one core they take twice their share.
+/// Core-seconds that one second of the time limit `--time` counts as, on every machine, unless the user names a number of
+/// threads. It is small, so that on most machines pilots take less than their share; on one core they take twice their
+/// share.
 const ASSUMED_CORES: f64 = 2.0;
 /// Largest share of the time limit that an iteration may take, so that a picture has the iterations that its finish and
 /// its error estimate need.
@@ -116,6 +117,12 @@ pub(super) fn default_misses_light(scene: &Scene) -> bool {
     !Method::Vcm.search().finds(Effect::Sds, &scene.survey)
 }
 
+/// Core-seconds that one second of the time limit counts as. Shards of a render choose the same method, with any numbers
+/// of threads.
+fn cores(settings: &Settings) -> f64 {
+    if settings.threads == 0 || settings.shard.count > 1 { ASSUMED_CORES } else { settings.threads as f64 }
+}
+
 fn pixel_count(camera: &Camera) -> f64 {
     let (width, height) = camera.size();
     f64::from(width) * f64::from(height)
@@ -144,12 +151,10 @@ impl<'a> Pilot<'a> {
         };
         let longest = MAX_COST_RATIO * seconds(Candidate::CAMERA_PATHS);
         let work = |n: u64| n as f64 * seconds(Candidate::DEFAULT).min(longest);
-        let budget = match (gathering.iterations, gathering.time) {
-            (Some(n), time) => {
-                let work = work(n);
-                time.map_or(work, |seconds| work.min(seconds * ASSUMED_CORES))
-            }
-            (None, Some(seconds)) => seconds * ASSUMED_CORES,
+        let within_time = gathering.time.map(|seconds| seconds * cores(gathering));
+        let budget = match (gathering.iterations, within_time) {
+            (Some(n), limit) => limit.map_or(work(n), |limit| work(n).min(limit)),
+            (None, Some(limit)) => limit,
             (None, None) => work(DEFAULT_ITERATIONS).min(UNLIMITED_CORE_SECONDS),
         };
         Pilot { view, gathering, cost, pixels, budget }
@@ -158,7 +163,7 @@ impl<'a> Pilot<'a> {
     /// Largest core-seconds of an iteration of a candidate, if the cheapest candidate takes `least` and the pilot
     /// `pilot`; infinite without a time limit.
     pub fn longest_iteration(&self, least: f64, pilot: f64) -> f64 {
-        let limit = |seconds: f64| MAX_ITERATION_SHARE * (seconds * ASSUMED_CORES - pilot);
+        let limit = |seconds: f64| MAX_ITERATION_SHARE * (seconds * cores(self.gathering) - pilot);
         self.gathering.time.map_or(f64::INFINITY, |seconds| limit(seconds).max(MAX_LONG_RATIO * least))
     }
 
@@ -177,7 +182,7 @@ impl<'a> Pilot<'a> {
     /// Shortest time limit of a render whose pilot measures light effects, in seconds.
     pub fn seconds_to_measure(&self) -> f64 {
         let least = weights::MAX_LIGHT_PICTURES as f64 * self.effects_picture_seconds();
-        least / (EFFECTS_WORK_SHARE * PILOT_WORK_SHARE * ASSUMED_CORES)
+        least / (EFFECTS_WORK_SHARE * PILOT_WORK_SHARE * cores(self.gathering))
     }
 
     /// Core-seconds of one of the pictures that measure the effects of the scene.

@@ -47,7 +47,8 @@ pub fn run(args: &PlanArgs) -> Result<()> {
 
 fn report(args: &PlanArgs) -> Result<()> {
     let (options, form) = (&args.options, Form::for_output(args.json));
-    let request = options.picture_request()?;
+    let mut request = options.picture_request()?;
+    request.settings.threads = args.threads;
     let loaded = scene::read(&options.scene, form, rayon::current_num_threads())?;
     let auto = request.settings.method.0.is_none();
     let doing = if auto { "choosing a method" } else { "planning" };

@@ -45,11 +45,12 @@ pub const REACH: usize = 3;
 const PERCENTILE: f32 = 0.8;
 
 /// The spread of every pixel and channel, the standard error that limits its displacement: the larger of its own and
-/// the percentile `PERCENTILE` of its neighbours'. Standard errors that are not finite count as infinite. The spread of
-/// an exact pixel is zero.
+/// the percentile `PERCENTILE` of its neighbours'. Standard errors that are not finite count as infinite.
 ///
 /// A neighbour counts only if its estimate is not above the pixel's by more than [`limit`] of the neighbour's standard
-/// errors: beside a bright light the pixel's own samples show that it does not see the light.
+/// errors: beside a bright light the pixel's own samples show that it does not see the light. All samples of an exact
+/// pixel are equal, so that neighbours whose estimate is as far below do not count either. Others do, because few samples
+/// may all have taken the same way through glass.
 pub fn spread(estimate: &Estimate) -> Picture {
     let Estimate { mean, deviation, samples, .. } = estimate;
     let (size, limit) = (mean.size(), limit(*samples));
@@ -72,13 +73,19 @@ pub fn spread(estimate: &Estimate) -> Picture {
                     let all = plane.inner_spreads(index).to_array();
                     row[x..].iter_mut().zip(all).for_each(|(rgb, spread)| rgb[c] = spread);
                 } else {
-                    row[x][c] = plane.spread(index, &mut ranked);
+                    let around = plane.percentile(index, &mut ranked, |above| above);
+                    row[x][c] = plane.error[index].max(around);
                 }
             }
             x += lanes;
         }
-        let exact = |x: &usize| estimate.is_exact(y * size.width + x);
-        (0..size.width).filter(exact).for_each(|x| row[x] = [0.0; 3]);
+        for (index, spread) in (y * size.width..).zip(row) {
+            if *spread != [0.0; 3] && estimate.is_exact(index) {
+                let shows_nothing = mean[index] == [0.0; 3];
+                let mut around = |plane: &Plane| plane.percentile(index, &mut ranked, f32::abs);
+                *spread = planes.each_ref().map(|plane| if shows_nothing { 0.0 } else { around(plane) });
+            }
+        }
     });
     Picture::new(size, spread)
 }
@@ -107,20 +114,21 @@ struct Plane {
 }
 
 impl Plane {
-    /// The spread of a pixel that is not exact; `ranked` is a buffer.
-    fn spread(&self, index: usize, ranked: &mut Vec<f32>) -> f32 {
+    /// The percentile of the standard errors around a pixel. Those count whose `distance`, a function of the difference
+    /// of the estimates, is not beyond the limit. `ranked` is a buffer.
+    fn percentile(&self, index: usize, ranked: &mut Vec<f32>, distance: fn(f32) -> f32) -> f32 {
         let error_of = |other: usize| {
-            let apart = self.mean[other] - self.mean[index];
+            let apart = distance(self.mean[other] - self.mean[index]);
             if apart > self.limit * self.error[other] { 0.0 } else { self.error[other] }
         };
         ranked.clear();
         ranked.extend(window(self.size, index, REACH).map(error_of));
         let rank = rank(ranked.len());
-        let (_, around, _) = ranked.select_nth_unstable_by(rank, f32::total_cmp);
-        self.error[index].max(*around)
+        *ranked.select_nth_unstable_by(rank, f32::total_cmp).1
     }
 
-    /// [`Plane::spread`] of the pixel `index` and of the pixels after it, whose windows the border does not cut off.
+    /// Spreads of the pixel `index` and of the pixels after it that are not exact and whose windows the border does not cut
+    /// off.
     fn inner_spreads(&self, index: usize) -> f32x8 {
         let at = |plane: &[f32], index: usize| {
             f32x8::from(<[f32; LANES]>::try_from(&plane[index..][..LANES]).unwrap_or([0.0; LANES]))
@@ -185,6 +193,11 @@ impl<'a> Noise<'a> {
     pub fn new(estimate: &'a Estimate, spread: &'a Picture) -> Noise<'a> {
         Noise { estimate, spread, limit: limit(estimate.samples) }
     }
+
+    /// Whether the value of pixel `index` is known: all of its samples are equal, and nothing around it doubts them.
+    pub fn is_certain(&self, index: usize) -> bool {
+        self.spread[index] == [0.0; 3] && self.estimate.is_exact(index)
+    }
 }
 
 /// Numbers of pixels that the finish has clamped in any channel.
@@ -197,16 +210,16 @@ pub struct Clamped {
 }
 
 /// Moves every pixel of the estimate `mean` towards `denoised` within the limit of `noise`, clamped between zero and, if
-/// there is a limit, `brightest`, the [`brightest`] estimates of `mean`. Also counts the clamped pixels. Exact pixels stay.
+/// there is a limit, `brightest`, the [`brightest`] estimates of `mean`. Also counts the clamped pixels. Certain pixels stay.
 ///
 /// Values of `denoised` that are not finite are ignored; they replace values of `mean` that are not finite.
 pub fn displace(mean: &Picture, denoised: &Picture, noise: Noise<'_>, brightest: &Picture) -> (Picture, Clamped) {
-    let Noise { estimate, spread, limit } = noise;
+    let Noise { spread, limit, .. } = noise;
     let displaced = |index: usize, c: usize| {
         let (m, d) = (mean[index][c], denoised[index][c]);
         match (m.is_finite(), d.is_finite()) {
             (true, true) if limit.is_infinite() => {
-                if estimate.is_exact(index) {
+                if noise.is_certain(index) {
                     m
                 } else {
                     d
@@ -270,14 +283,37 @@ mod tests {
             let (spread, brightest) = (spread(&estimate), brightest(&estimate.mean));
             for (i, c) in (0..size.pixels()).flat_map(|i| [(i, 0), (i, 1), (i, 2)]) {
                 let (mean, error) = (|i: usize| estimate.mean[i][c], |i: usize| known(estimate.deviation[i][c]));
-                let reached =
-                    |other: usize| if mean(other) - mean(i) > LIMIT * error(other) { 0.0 } else { error(other) };
+                let apart = |other: usize| match estimate.is_exact(i) {
+                    true => (mean(other) - mean(i)).abs(),
+                    false => mean(other) - mean(i),
+                };
+                let reached = |other: usize| if apart(other) > LIMIT * error(other) { 0.0 } else { error(other) };
                 let mut errors: Vec<f32> = window(size, i, REACH).map(reached).collect();
                 errors.sort_by(f32::total_cmp);
                 let around = errors[(PERCENTILE * (errors.len() - 1) as f32).round() as usize];
-                assert_eq!(spread[i][c], if estimate.is_exact(i) { 0.0 } else { error(i).max(around) }, "{size:?} {i}");
+                let own = if estimate.is_exact(i) { 0.0 } else { error(i) };
+                assert_eq!(spread[i][c], own.max(around), "{size:?} {i}");
                 let finite = window(size, i, REACH).map(mean).filter(|mean| mean.is_finite());
                 assert_eq!(brightest[i][c], finite.fold(0.0, f32::max), "{size:?} {i}");
+            }
+        }
+    }
+
+    /// Few samples that all took the same way through glass leave no dot among noisy pixels. A lamp beside a noisy floor
+    /// keeps its value.
+    #[test]
+    fn equal_samples_are_certain_only_where_nothing_around_doubts_them() {
+        let dot = 15 * SIZE.width + 20;
+        for (value, certain) in [(0.9, false), (5.0, true)] {
+            let mean = plane(|index| if index == dot { value } else { 1.0 + 0.2 * (noise(3, index) - 0.5) });
+            let noisy = estimate(&mean, plane(|index| if index == dot { 0.0 } else { 0.05 }));
+            let noisy = Estimate { samples: Some(8), ..noisy };
+            assert!(noisy.is_exact(dot));
+            let spread = spread(&noisy);
+            let noise = Noise::new(&noisy, &spread);
+            for noise in [noise, Noise { limit: f32::INFINITY, ..noise }] {
+                let (out, _) = displace(&mean, &plane(|_| 1.0), noise, &brightest(&mean));
+                assert_eq!(out[dot][0], if certain { value } else { 1.0 }, "{}", noise.limit);
             }
         }
     }

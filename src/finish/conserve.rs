@@ -16,12 +16,15 @@ type Light = [f64; 3];
 
 /// Share of a picture's total light that the finish may lose: giving back less would add more noise than it is worth.
 const TOLERATED_LOSS: f64 = 0.04;
+/// Standard errors of the total light that are taken for noise. Light that is given back for noise brightens all surfaces,
+/// also those whose brightness is known well.
+const NOISE: f64 = 2.0;
 
 /// The part of the `lost` light of a picture with `total` light that neither the `variance` of that total explains nor
-/// [`TOLERATED_LOSS`] allows. A single bright sample equals its standard error, so that none of it is significant; of k
-/// equal ones `1 - 1 / k^2` is.
+/// [`TOLERATED_LOSS`] allows. Bright samples equal their standard errors, so that four equal ones are not significant; of k
+/// more, `1 - 16 / k^2` is.
 fn significant(lost: f64, variance: f64, total: f64) -> f64 {
-    let explained = (variance + (TOLERATED_LOSS * total).powi(2)) / (lost * lost);
+    let explained = (NOISE.powi(2) * variance + (TOLERATED_LOSS * total).powi(2)) / (lost * lost);
     if explained < 1.0 { lost * (1.0 - explained * explained) } else { 0.0 }
 }
 
@@ -31,7 +34,7 @@ struct Balance<'a> {
     mean: &'a Picture,
     denoised: &'a Picture,
     estimate: &'a Estimate,
-    /// Whether each pixel takes part in the balance: its values are finite, and it is not exact.
+    /// Whether each pixel takes part in the balance: its values are finite, and it is not certain.
     counts: Vec<bool>,
     /// Light to give back to all pixels together; negative if they have gained.
     owed: Light,
@@ -56,8 +59,8 @@ pub fn bounded(mean: &Picture, denoised: &Picture, noise: Noise<'_>) -> (Picture
 /// `brightest` are the [`brightest`] estimates of `mean`. A pixel stays within the limit of `noise`, or within the
 /// light that any pixel may have missed, of its estimate.
 fn give_back(picture: &mut Picture, mean: &Picture, denoised: &Picture, noise: Noise<'_>, brightest: &Picture) {
-    let Noise { estimate, spread, limit } = noise;
-    let balance = Balance::new(picture, mean, denoised, estimate);
+    let Noise { spread, limit, .. } = noise;
+    let balance = Balance::new(picture, mean, denoised, noise);
     let shortfall = balance.sum(|i, c| balance.shortfall(i, c));
     let light = balance.sum(|i, c| f64::from(picture[i][c]));
     let ratio = |a: f64, b: f64| if b > 0.0 { a / b } else { 0.0 };
@@ -85,10 +88,11 @@ fn give_back(picture: &mut Picture, mean: &Picture, denoised: &Picture, noise: N
 const CHUNK: usize = 4096;
 
 impl<'a> Balance<'a> {
-    fn new(picture: &'a Picture, mean: &'a Picture, denoised: &'a Picture, estimate: &'a Estimate) -> Balance<'a> {
+    fn new(picture: &'a Picture, mean: &'a Picture, denoised: &'a Picture, noise: Noise<'a>) -> Balance<'a> {
+        let estimate = noise.estimate;
         let finite = |plane: &Picture, i: usize| plane[i].iter().all(|value| value.is_finite());
         let all_finite = |i: usize| finite(mean, i) && finite(denoised, i) && finite(&estimate.deviation, i);
-        let counts = (0..mean.len()).into_par_iter().map(|i| all_finite(i) && !estimate.is_exact(i)).collect();
+        let counts = (0..mean.len()).into_par_iter().map(|i| all_finite(i) && !noise.is_certain(i)).collect();
         let [owed, missed] = [[0.0; 3]; 2];
         let balance = Balance { picture, mean, denoised, estimate, counts, owed, missed };
         let lost = balance.sum(|i, c| f64::from(mean[i][c]) - f64::from(picture[i][c]));
@@ -177,17 +181,24 @@ mod tests {
         }
     }
 
-    /// A single bright sample is no evidence, and exact pixels do not change.
+    /// Up to four bright samples are no evidence, and certain pixels do not change.
     #[test]
-    fn one_bright_sample_is_removed() {
-        let mut estimate = rare(1e-9, 1, 1.0);
-        (estimate.mean[777], estimate.deviation[777]) = ([1000.0; 3], [1000.0; 3]);
-        let exact = |index: usize| index.is_multiple_of(5);
-        (0..SIZE.pixels()).filter(|i| exact(*i)).for_each(|i| estimate.deviation[i] = [0.0; 3]);
-        let [within, whole] = finished(&estimate, 0.1);
-        let brightest = whole.iter().map(|rgb| rgb[0]).fold(0.0, f32::max);
-        assert!(mean(&whole) < 1.02 * mean(&within) && brightest < 0.2, "{brightest}");
-        assert!((0..SIZE.pixels()).filter(|i| exact(*i)).all(|i| whole[i] == estimate.mean[i]));
+    fn few_bright_samples_are_removed() {
+        for count in [1, 4] {
+            let mut estimate = rare(1e-9, 1, 1.0);
+            for bright in [777, 203, 1104, 1511].into_iter().take(count) {
+                (estimate.mean[bright], estimate.deviation[bright]) = ([1000.0; 3], [1000.0; 3]);
+            }
+            let lamp = |index: usize| index.is_multiple_of(5);
+            for index in (0..SIZE.pixels()).filter(|index| lamp(*index)) {
+                (estimate.mean[index], estimate.deviation[index]) = ([7.0; 3], [0.0; 3]);
+            }
+            let [within, whole] = finished(&estimate, 0.1);
+            let others = |index: &usize| !lamp(*index);
+            let brightest = (0..SIZE.pixels()).filter(others).map(|i| whole[i][0]).fold(0.0, f32::max);
+            assert!(mean(&whole) < 1.02 * mean(&within) && brightest < 0.2, "{count}: {brightest}");
+            assert!((0..SIZE.pixels()).filter(|i| lamp(*i)).all(|i| whole[i] == estimate.mean[i]));
+        }
     }
 
     /// Scaling the light by a power of two scales the result exactly.

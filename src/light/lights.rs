@@ -9,7 +9,7 @@ use super::emission::{DirectSample, EmissionDensity, EmissionSample, EntryDisc};
 use super::environment::EnvironmentSample;
 use super::group::{Group, Groups};
 use super::kind::{
-    Arrival, Emitter, EnvironmentLight, Light, LightRay, Owner, SceneParts, Selected, TriangleLight, VolumeLight,
+    Emitter, EnvironmentLight, Light, LightRay, Owner, SceneParts, Selected, TriangleLight, VolumeLight,
 };
 use super::learnt_sky::LearntSky;
 use super::links::{LightLinks, LinkedObjects, Linking};
@@ -254,13 +254,7 @@ impl Lights {
     pub fn next_event_ratio(&self, receiver: &Receiver, light: u32, wi: Vec3) -> f32 {
         let (Some(choice), index) = (&self.choice, light as usize) else { return 1.0 };
         let chosen = choice.pdf(receiver, index) / choice.power().pdf(index);
-        match self.emitters[index].arriving(&self.sky, receiver, wi, false) {
-            Some(Arrival { direct, start, .. }) if start > 0.0 => chosen * (direct / start),
-            _ => match &self.emitters[index] {
-                Emitter::Triangle(triangle) => chosen * triangle.relative_density_along(receiver, wi),
-                _ => chosen,
-            },
-        }
+        chosen * self.emitters[index].relative_density(&self.sky, receiver, wi)
     }
 
     /// Ranges of emitter indices that belong to one object (the triangles of an instance, or a single other light),
@@ -413,7 +407,7 @@ impl Lights {
         let radiance = materials.list[surface.material as usize].emitted(surface, &materials.textures) * relative;
         let choice = self.choice.as_ref()?;
         let [direct, start] = [choice.pdf(from, index), choice.power().pdf(index)].map(|chosen| chosen / triangle.area);
-        let direct = direct * triangle.relative_density(from, surface.p.distance_squared(from.p), cos);
+        let direct = direct * triangle.density_at(from, surface.p.distance_squared(from.p), cos);
         Some((radiance, EmissionDensity { direct, start, onward, cos, infinite: false, delta: false }))
     }
 

@@ -169,7 +169,7 @@ fn files_outside_the_scenes_folder_are_rejected() {
                  hint: put it beside the scene file and name it so, or allow such files with --allow-outside\n";
     let render = "-o out.exr --width 16 --iterations 1 --photons 100 --no-combine --progress none";
     let converge = "-o out --methods path --time 0.1 --width 16";
-    for (command, options) in [("info", ""), ("plan", ""), ("render", render), ("converge", converge)] {
+    for (command, options) in [("info", ""), ("plan", "--width 16"), ("render", render), ("converge", converge)] {
         let outcome = folder.run(&format!("{command} scenes/out.glb {options}"));
         assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(1), error), "{command}");
         if command != "converge" {

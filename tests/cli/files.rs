@@ -546,7 +546,9 @@ fn names_may_be_invalid_utf8() {
     let folder = Folder::new();
     let name = bytes(b"sc\xffne.glb");
     std::fs::rename(folder.path("scene.glb"), folder.path("").join(name)).expect("it can be renamed");
-    for command in ["render -o out.exr --width 8 --iterations 1 --method path --progress none", "plan", "info"] {
+    for command in
+        ["render -o out.exr --width 8 --iterations 1 --method path --progress none", "plan --width 16", "info"]
+    {
         let mut command = folder.command(command);
         command.arg(name);
         let outcome = crate::Outcome::of(command);

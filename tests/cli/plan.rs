@@ -47,7 +47,7 @@ fn a_plan_without_figures_says_how_to_get_them() {
 #[test]
 fn the_plan_as_json_has_the_documented_keys() {
     let folder = Folder::new();
-    let outcome = folder.run("plan scene.glb --json --env 1,1,1 --effects -environment");
+    let outcome = folder.run("plan scene.glb --width 16 --json --env 1,1,1 --effects -environment");
     assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(0), ""));
     let plan = outcome.json();
     assert_eq!(plan["scene"], "scene.glb");
@@ -175,7 +175,7 @@ fn plan_fails_for_a_missing_camera_and_with_strict() {
         (Some(2), "scene.glb: there is no camera \"Top\"\nhint: it has \"Camera\", \"Side\"\n")
     );
     crate::support::glb::write(&folder.path("dark.glb"), false);
-    let outcome = folder.run("plan dark.glb --strict --json");
+    let outcome = folder.run("plan dark.glb --width 16 --strict --json");
     assert_eq!((outcome.code, outcome.json()["warnings"].as_array().map(Vec::len)), (Some(1), Some(1)));
     assert!(outcome.stderr.starts_with("dark.glb: 1 thing is ignored or approximated"), "{}", outcome.stderr);
 }
@@ -183,7 +183,7 @@ fn plan_fails_for_a_missing_camera_and_with_strict() {
 /// `auto` takes no more than a tenth of `--time` for its pilot, and says so if that is too short for one.
 #[test]
 fn the_pilot_ends_after_a_tenth_of_the_time() {
-    let plan = Folder::new().run("plan scene.glb --json --time 0.0001").json();
+    let plan = Folder::new().run("plan scene.glb --width 16 --json --time 0.0001").json();
     let because = plan["because"].as_str().expect("a reason");
     assert!(because.ends_with("for the time for a pilot is over"), "{because}");
 }

@@ -50,7 +50,9 @@ fn all_that_programs_read_is_json() {
         assert_eq!(outcome.code, Some(code));
         assert!(last["message"].as_str().is_some_and(|message| !message.is_empty()));
     }
-    let outcome = folder.run("render scene.glb -o out.exr --iterations 1 --width 8 --threads 1024 --progress json");
+    let outcome = folder.run(
+        "render scene.glb -o out.exr --method path --iterations 1 --width 8 --no-finish --threads 1024 --progress json",
+    );
     let first: Value = serde_json::from_str(outcome.stderr.lines().next().unwrap_or_default()).expect("a JSON line");
     assert_eq!(first["event"], "warning");
     assert!(first["message"].as_str().is_some_and(|message| message.starts_with("--threads 1024")), "{first}");
@@ -72,7 +74,7 @@ fn names_in_a_scene_cannot_control_terminals_or_farms() {
         assert!(outcome.stderr.contains(escaped), "{}", outcome.stderr);
         assert!(!outcome.stderr.contains("\nopenjd_fail") && !acts(&outcome.stderr), "{progress}");
     }
-    for command in ["info scene.glb", "plan scene.glb", "info out.exr"] {
+    for command in ["info scene.glb", "plan scene.glb --width 16", "info out.exr"] {
         let [text, json] = ["", " --json"].map(|form| folder.run(&format!("{command}{form}")).stdout);
         assert!(!text.contains("\nopenjd_fail") && !acts(&text) && !acts(&json), "{command}");
         let json: Value = serde_json::from_str(&json).expect("it is JSON");

@@ -90,9 +90,9 @@ fn check(what: &str, photons: &[Vec<f64>], paths: &[Vec<f64>], bias: f64, plante
 #[test]
 fn glossy_room() {
     let scene = build(glossy_balls());
-    let paths = by_paths(&scene, 24, 10);
+    let paths = by_paths(&scene, 8, 20);
     for mode in INDIRECT_MODES {
-        check(&format!("glossy room, {mode:?}"), &by_photons(&scene, mode, 20_000, 0.05, 8, 10), &paths, 0.015, 0.15);
+        check(&format!("glossy room, {mode:?}"), &by_photons(&scene, mode, 20_000, 0.05, 3, 20), &paths, 0.015, 0.15);
     }
 }
 
@@ -117,9 +117,9 @@ fn lamp_behind_glass_in_a_varnished_room() {
     };
     add(&mut description, "metal", sphere(Vec3::new(0.3, 0.5, 0.0), 0.5, 64), metal);
     let scene = build(description);
-    let paths = by_paths(&scene, 256, 10);
+    let paths = by_paths(&scene, 80, 20);
     for mode in INDIRECT_MODES {
-        check(&format!("varnish, {mode:?}"), &by_photons(&scene, mode, 20_000, 0.06, 12, 10), &paths, 0.02, 0.2);
+        check(&format!("varnish, {mode:?}"), &by_photons(&scene, mode, 20_000, 0.06, 4, 20), &paths, 0.02, 0.2);
     }
 }
 
@@ -131,9 +131,9 @@ fn glass_room() {
     let rough = Material { roughness: 0.4.into(), ..glass(1.4) };
     add(&mut description, "rough", sphere(Vec3::new(0.45, 0.45, 0.3), 0.4, 64), rough);
     let scene = build(description);
-    let paths = by_paths(&scene, 64, 10);
+    let paths = by_paths(&scene, 20, 20);
     for mode in INDIRECT_MODES {
-        check(&format!("glass room, {mode:?}"), &by_photons(&scene, mode, 40_000, 0.04, 8, 10), &paths, 0.02, 0.2);
+        check(&format!("glass room, {mode:?}"), &by_photons(&scene, mode, 40_000, 0.04, 3, 20), &paths, 0.02, 0.2);
     }
 }
 
@@ -161,8 +161,8 @@ fn under_the_sky() {
     description.environment = Some(EnvironmentDescription { source, rotation_deg: 30.0, strength: 1.0 });
     description.cameras.push(look_at(DVec3::new(1.2, 1.4, 2.2), DVec3::new(0.0, 0.2, 0.0), 40.0));
     let scene = build(description);
-    let paths = by_paths(&scene, 128, 16);
+    let paths = by_paths(&scene, 64, 24);
     for mode in INDIRECT_MODES {
-        check(&format!("sky, {mode:?}"), &by_photons(&scene, mode, 60_000, 0.04, 8, 16), &paths, 0.02, 0.2);
+        check(&format!("sky, {mode:?}"), &by_photons(&scene, mode, 60_000, 0.04, 4, 24), &paths, 0.02, 0.2);
     }
 }

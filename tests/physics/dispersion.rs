@@ -429,7 +429,7 @@ fn photons(photons: u32, radius: f32, iterations: u64, seed: u64) -> Settings {
     Settings { photons, initial_bandwidth: InitialBandwidth::Fixed(radius), ..settings(iterations, seed) }
 }
 
-const SEEDS: u64 = 10;
+const SEEDS: u64 = 20;
 
 /// Renders one picture per seed.
 fn seeds(scene: &Scene, method: Method, of: impl Fn(u64) -> Settings) -> Vec<Vec<f64>> {
@@ -503,20 +503,20 @@ fn plus(settings: Settings) -> Settings {
 #[test]
 fn a_rainbow_agrees() {
     let scene = rainbow(strong, false);
-    let light = seeds(&scene, Method::Light, |seed| settings(200, seed));
-    let plain = seeds(&rainbow(glass, false), Method::Light, |seed| settings(50, seed));
+    let light = seeds(&scene, Method::Light, |seed| settings(60, seed));
+    let plain = seeds(&rainbow(glass, false), Method::Light, |seed| settings(15, seed));
     assert!(!disagreeing(&plain, &light, 0.2).is_empty(), "glass that does not disperse is not detected");
-    let path = seeds(&scene, Method::Path, |seed| settings(600, seed));
+    let path = seeds(&scene, Method::Path, |seed| settings(180, seed));
     agree("rainbow, path", &path, &light, 2e-3, 0.35);
-    let bdpt = seeds(&scene, Method::Bdpt, |seed| settings(100, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, |seed| settings(30, seed));
     agree("rainbow, bdpt", &bdpt, &light, 2e-3, 0.15);
-    let vcm = seeds(&scene, Method::Vcm, |seed| merging(80, seed));
+    let vcm = seeds(&scene, Method::Vcm, |seed| merging(24, seed));
     agree("rainbow, vcm", &vcm, &light, 0.01, 0.15);
     for method in [Method::Sppm, Method::Ppm] {
-        let other = seeds(&scene, method, |seed| photons(10_000, 0.06, 12, seed));
+        let other = seeds(&scene, method, |seed| photons(10_000, 0.06, 4, seed));
         agree(&format!("rainbow, {method:?}"), &other, &light, 0.02, 0.2);
     }
-    let other = seeds(&scene, Method::Cppm, |seed| plus(photons(30_000, 0.06, 16, seed)));
+    let other = seeds(&scene, Method::Cppm, |seed| plus(photons(30_000, 0.06, 5, seed)));
     agree("rainbow, cppm plus", &other, &light, 0.02, 0.4);
 }
 
@@ -525,20 +525,20 @@ fn a_rainbow_agrees() {
 #[ignore = "long"]
 fn a_rainbow_behind_dispersive_glass_agrees() {
     let scene = rainbow(strong, true);
-    let path = seeds(&scene, Method::Path, |seed| settings(1000, seed));
-    let plain = seeds(&rainbow(glass, true), Method::Sppm, |seed| photons(10_000, 0.06, 12, seed));
+    let path = seeds(&scene, Method::Path, |seed| settings(300, seed));
+    let plain = seeds(&rainbow(glass, true), Method::Sppm, |seed| photons(10_000, 0.06, 4, seed));
     assert!(!disagreeing(&plain, &path, 0.2).is_empty(), "glass that does not disperse is not detected");
-    let bdpt = seeds(&scene, Method::Bdpt, |seed| settings(150, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, |seed| settings(45, seed));
     agree("rainbow behind glass, bdpt", &bdpt, &path, 2e-3, 0.5);
     for method in [Method::Vcm, Method::Bpm] {
-        let other = seeds(&scene, method, |seed| merging(320, seed));
+        let other = seeds(&scene, method, |seed| merging(96, seed));
         agree(&format!("rainbow behind glass, {method:?}"), &other, &path, 0.02, 0.4);
     }
     for method in [Method::Sppm, Method::Cppm, Method::Pm] {
-        let other = seeds(&scene, method, |seed| photons(20_000, 0.06, 20, seed));
+        let other = seeds(&scene, method, |seed| photons(20_000, 0.06, 6, seed));
         agree(&format!("rainbow behind glass, {method:?}"), &other, &path, 0.02, 0.4);
     }
-    let other = seeds(&scene, Method::Cppm, |seed| plus(photons(20_000, 0.06, 60, seed)));
+    let other = seeds(&scene, Method::Cppm, |seed| plus(photons(20_000, 0.06, 18, seed)));
     agree("rainbow behind glass, cppm plus", &other, &path, 0.02, 0.4);
 }
 
@@ -559,10 +559,10 @@ fn a_rainbow_in_fog_agrees() {
     description.medium = Some(MediumParameters { sigma_a: Rgb::splat(0.05), sigma_s: Rgb::splat(0.7), g: 0.3 });
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 1.9), DVec3::new(0.0, 0.8, 0.0), 50.0));
     let scene = build(description);
-    let path = seeds(&scene, Method::Path, |seed| settings(80, seed));
-    let bdpt = seeds(&scene, Method::Bdpt, |seed| settings(30, seed));
+    let path = seeds(&scene, Method::Path, |seed| settings(24, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, |seed| settings(9, seed));
     agree("rainbow in fog, bdpt", &bdpt, &path, 2e-3, 0.3);
-    let sppm = seeds(&scene, Method::Sppm, |seed| photons(10_000, 0.08, 16, seed));
+    let sppm = seeds(&scene, Method::Sppm, |seed| photons(10_000, 0.08, 5, seed));
     agree("rainbow in fog, sppm", &sppm, &bdpt, 0.03, 0.3);
 }
 
@@ -580,12 +580,12 @@ fn rough_dispersive_glass_agrees() {
     }
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 2.8), DVec3::new(0.0, 0.9, 0.0), 50.0));
     let scene = build(description);
-    let path = seeds(&scene, Method::Path, |seed| settings(40, seed));
-    let bdpt = seeds(&scene, Method::Bdpt, |seed| settings(12, seed));
+    let path = seeds(&scene, Method::Path, |seed| settings(12, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, |seed| settings(4, seed));
     agree("rough glass, bdpt", &bdpt, &path, 2e-3, 0.15);
-    let vcm = seeds(&scene, Method::Vcm, |seed| merging(24, seed));
+    let vcm = seeds(&scene, Method::Vcm, |seed| merging(7, seed));
     agree("rough glass, vcm", &vcm, &path, 0.02, 0.15);
-    let sppm = seeds(&scene, Method::Sppm, |seed| photons(20_000, 0.05, 16, seed));
+    let sppm = seeds(&scene, Method::Sppm, |seed| photons(20_000, 0.05, 5, seed));
     agree("rough glass, sppm", &sppm, &path, 0.03, 0.2);
 }
 
@@ -678,9 +678,9 @@ fn little_dispersion_is_nearly_none() {
     let none = rainbow(glass, true);
     let little = rainbow(|ior| Material { dispersion: 1e-5, ..glass(ior) }, true);
     assert!(little.survey.dispersion);
-    let sppm = |scene: &Scene, first: u64| seeds(scene, Method::Sppm, |seed| photons(20_000, 0.06, 16, seed + first));
+    let sppm = |scene: &Scene, first: u64| seeds(scene, Method::Sppm, |seed| photons(20_000, 0.06, 5, seed + first));
     let plain = sppm(&none, 0);
     agree("little dispersion, sppm", &sppm(&little, 100), &plain, 2e-3, 0.2);
-    let bdpt = seeds(&little, Method::Bdpt, |seed| settings(100, seed));
+    let bdpt = seeds(&little, Method::Bdpt, |seed| settings(30, seed));
     agree("little dispersion, bdpt", &bdpt, &plain, 0.02, 0.8);
 }

@@ -54,7 +54,7 @@ fn columns(scene: &Scene, method: Method, filter: Filter) -> Vec<Vec<f64>> {
     (0..SEEDS)
         .map(|seed| {
             let settings =
-                Settings { method, seed, levels: Levels::new(1), iterations: Some(256), ..Settings::default() };
+                Settings { method, seed, levels: Levels::new(1), iterations: Some(64), ..Settings::default() };
             let rendered = render(scene, &camera, &settings, |_, _| Control::Continue);
             let of = |x: u32| (0..SIDE).map(move |y| (y * SIDE + x) as usize);
             let value = |index: usize| rendered.pixels[index].mean(0).x;

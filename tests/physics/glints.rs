@@ -12,7 +12,7 @@ use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, sphere, s
 use support::stats::{mean_and_error, t_critical};
 
 const SIZE: u32 = 16;
-const SEEDS: u64 = 8;
+const SEEDS: u64 = 16;
 const ERROR_RATE: f64 = 1e-3;
 /// Allowed relative bias: rays lost at edges, errors of energy tables, and photons missing beyond the walls.
 const BIAS: f64 = 0.01;
@@ -75,7 +75,7 @@ fn check_furnaces(furnaces: &[(f32, f32)]) {
                 photons: 15_000,
                 initial_bandwidth: InitialBandwidth::Fixed(radius),
                 levels: Levels::new(levels),
-                iterations: Some(16),
+                iterations: Some(5),
                 ..Settings::default()
             };
             let (values, shared): (Vec<f64>, Vec<f64>) = (0..SEEDS).map(|seed| mean(&scene, &settings(seed))).unzip();
@@ -171,7 +171,7 @@ fn empty_photon_maps_do_not_change_the_mean() {
             photons,
             initial_bandwidth: InitialBandwidth::Fixed(0.2),
             levels: Levels::new(1),
-            iterations: Some(1000),
+            iterations: Some(300),
             ..Settings::default()
         };
         let values: Vec<f64> = (0..SEEDS).map(|seed| mean(&scene, &settings(seed)).0).collect();

@@ -15,7 +15,7 @@ use caustique::medium::MediumParameters;
 use caustique::path_class::{ClassSet, Effect, PathClass};
 use caustique::plan::switch;
 use caustique::random::Domain;
-use caustique::render::{Candidate, Control, InitialBandwidth, Levels, Method, Settings, render};
+use caustique::render::{Candidate, Control, InitialBandwidth, Levels, Method, Settings, Shard, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
 use caustique::scene::{Description, Scene, Survey, View};
 use caustique::stat::floor;
@@ -332,11 +332,30 @@ fn auto_among(scene: &Scene, threads: usize, iterations: u64, allowed: impl Fn(C
     pool.install(|| choose(View::new(scene, &camera), make, &Stop::default())).expect("a choice")
 }
 
+/// A second of a time limit counts as the work of the threads that the user names, except in shards, whose numbers of
+/// threads may differ.
+#[test]
+fn a_time_limit_is_planned_as_the_work_of_the_named_threads() {
+    let scene = matte_room();
+    let camera = scene.camera(&square(24)).expect("a camera");
+    let seconds_to_measure = |threads, count| {
+        let shard = Shard { index: 0, count };
+        let make = |candidate| {
+            let usual = Settings::for_candidate(candidate);
+            Some(Settings { time: Some(1e-3), iterations: None, threads, shard, ..usual })
+        };
+        choose(View::new(&scene, &camera), make, &Stop::default()).expect("a choice").seconds_to_measure
+    };
+    let unnamed = seconds_to_measure(0, 1);
+    assert_eq!([1, 2, 16].map(|threads| seconds_to_measure(threads, 1) / unnamed), [2.0, 1.0, 0.125]);
+    assert_eq!(seconds_to_measure(16, 3), unnamed);
+}
+
 /// The choice and the predicted errors do not depend on the number of threads, to the bit.
 #[test]
 fn the_choice_does_not_depend_on_threads() {
     let scene = matte_room();
-    let [one, three] = [1, 3].map(|threads| auto(&scene, threads, 20_000));
+    let [one, three] = [1, 3].map(|threads| auto(&scene, threads, 5000));
     assert!(one.pilots.len() >= 3, "{:?}", one.reason);
     assert_eq!(one.candidate, three.candidate);
     for (a, b) in one.pilots.iter().zip(&three.pilots) {
@@ -357,7 +376,7 @@ fn the_choice_does_not_depend_on_threads() {
 #[test]
 fn effects_are_weighed() {
     let scene = glass_room();
-    let choice = auto(&scene, 2, 20_000);
+    let choice = auto(&scene, 2, 5000);
     let energy = |effect: Effect| weight(&choice.weights, effect).and_then(|w| w.energy).unwrap_or(0.0);
     println!("{:?}", choice.weights);
     let sum: f64 = choice.weights.iter().filter_map(|w| w.energy).sum();
@@ -492,9 +511,8 @@ fn a_pilot_can_be_stopped() {
     let scene = matte_room();
     let camera = scene.camera(&square(24)).expect("a camera");
     let pilots = |stop: bool| {
-        let make = |candidate| {
-            Some(Settings { photons: 2000, iterations: Some(20_000), ..Settings::for_candidate(candidate) })
-        };
+        let make =
+            |candidate| Some(Settings { photons: 2000, iterations: Some(5000), ..Settings::for_candidate(candidate) });
         let stop = Stop::from_flag(Arc::new(stop.into()));
         choose(View::new(&scene, &camera), make, &stop).expect("a choice").pilots.len()
     };
@@ -537,7 +555,7 @@ fn caustics_are_left_to_guided_light_paths() {
 #[test]
 fn only_needed_candidates_are_tried() {
     let scene = matte_room();
-    let matte_only = auto(&scene, 2, 20_000);
+    let matte_only = auto(&scene, 2, 5000);
     let tried: Vec<Method> = matte_only.pilots.iter().map(|trial| trial.candidate.rendered_by()).collect();
     assert!([Method::Vcm, Method::Path, Method::Bdpt].iter().all(|method| tried.contains(method)), "{tried:?}");
     assert!(matte_only.pilots.iter().all(|trial| !trial.candidate.guided));

@@ -312,12 +312,12 @@ fn subsurface_scattering_agrees() {
     );
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 1.9), DVec3::new(0.0, 0.6, 0.0), 55.0));
     let scene = build(description);
-    let path = seeds(&scene, Method::Path, 10, |seed| settings(24, seed));
+    let path = seeds(&scene, Method::Path, 20, |seed| settings(7, seed));
     for method in [Method::Bdpt, Method::Vcm] {
-        let other = seeds(&scene, method, 10, |seed| settings(10, seed));
+        let other = seeds(&scene, method, 20, |seed| settings(3, seed));
         agree(&format!("wax, {method:?}"), &other, &path, 0.01, 0.2);
     }
-    let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(10_000, 0.06, 16, seed));
+    let sppm = seeds(&scene, Method::Sppm, 20, |seed| photons(10_000, 0.06, 5, seed));
     agree("wax, sppm", &sppm, &path, 0.03, 0.3);
 }
 
@@ -486,13 +486,13 @@ fn god_rays() -> Scene {
 #[ignore = "long"]
 fn god_rays_agree() {
     let scene = god_rays();
-    let path = seeds(&scene, Method::Path, 10, |seed| settings(150, seed));
-    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(40, seed));
+    let path = seeds(&scene, Method::Path, 20, |seed| settings(45, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, 20, |seed| settings(12, seed));
     agree("god rays, bdpt", &bdpt, &path, 2e-3, 0.12);
-    let vcm = seeds(&scene, Method::Vcm, 10, |seed| settings(40, seed));
+    let vcm = seeds(&scene, Method::Vcm, 20, |seed| settings(12, seed));
     agree("god rays, vcm", &vcm, &path, 0.01, 0.12);
     for method in [Method::Sppm, Method::Cppm] {
-        let by_photons = seeds(&scene, method, 10, |seed| photons(10_000, 0.08, 20, seed));
+        let by_photons = seeds(&scene, method, 20, |seed| photons(10_000, 0.08, 6, seed));
         agree(&format!("god rays, {method:?}"), &by_photons, &bdpt, 0.03, 0.3);
     }
 }
@@ -509,10 +509,10 @@ fn a_glass_ball_in_fog_agrees() {
     description.medium = Some(fog([0.1, 0.05, 0.0], [0.6, 0.8, 1.0], 0.3));
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 1.9), DVec3::new(0.0, 0.9, 0.0), 55.0));
     let scene = build(description);
-    let path = seeds(&scene, Method::Path, 10, |seed| settings(120, seed));
-    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(30, seed));
+    let path = seeds(&scene, Method::Path, 20, |seed| settings(36, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, 20, |seed| settings(9, seed));
     agree("ball in fog, bdpt", &bdpt, &path, 2e-3, 0.2);
-    let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(10_000, 0.08, 20, seed));
+    let sppm = seeds(&scene, Method::Sppm, 20, |seed| photons(10_000, 0.08, 6, seed));
     agree("ball in fog, sppm", &sppm, &bdpt, 0.03, 0.3);
 }
 
@@ -531,10 +531,10 @@ fn coloured_media_in_meshes_agree() {
     add(&mut description, "smoke", sphere(Vec3::new(0.45, 0.6, 0.2), 0.45, 48), holds(smoke));
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 1.9), DVec3::new(0.0, 0.7, 0.0), 55.0));
     let scene = build(description);
-    let path = seeds(&scene, Method::Path, 10, |seed| settings(24, seed));
-    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(8, seed));
+    let path = seeds(&scene, Method::Path, 20, |seed| settings(7, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, 20, |seed| settings(3, seed));
     agree("coloured media, bdpt", &bdpt, &path, 2e-3, 0.15);
-    let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(10_000, 0.06, 16, seed));
+    let sppm = seeds(&scene, Method::Sppm, 20, |seed| photons(10_000, 0.06, 5, seed));
     agree("coloured media, sppm", &sppm, &bdpt, 0.03, 0.3);
 }
 
@@ -550,9 +550,9 @@ fn a_volumetric_caustic_agrees() {
     // The ball is above the picture, because no connection finds the light that it shows.
     description.cameras.push(look_at(DVec3::new(0.0, 0.8, 2.6), DVec3::new(0.0, 0.15, 0.0), 25.0));
     let scene = build(description);
-    let light = seeds(&scene, Method::Light, 10, |seed| settings(48, seed));
-    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(56, seed));
-    let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(8_000, 0.12, 12, seed));
+    let light = seeds(&scene, Method::Light, 20, |seed| settings(14, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, 20, |seed| settings(17, seed));
+    let sppm = seeds(&scene, Method::Sppm, 20, |seed| photons(8_000, 0.12, 4, seed));
     agree("volumetric caustic, bdpt", &bdpt, &light, 5e-3, 0.25);
     agree("volumetric caustic, sppm", &sppm, &bdpt, 0.04, 0.3);
 }

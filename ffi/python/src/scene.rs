@@ -149,9 +149,11 @@ impl Scene {
         let arguments = self.arguments(py, options)?;
         let progress = progress.map(Arc::new);
         let done = work(py, threads, |caller| {
+            let mut picture = render.picture_request()?;
+            picture.settings.threads = threads;
             let request = Request {
                 scene: self.request(),
-                picture: render.picture_request()?,
+                picture,
                 finish: (!render.no_finish).then(|| render.finish.request()),
                 layers,
                 naming: Naming::Plain,
@@ -190,7 +192,8 @@ impl Scene {
         let (render, _) = options::take(&mut keywords, &options::of_plan(), &self.options)?;
         keywords.check_all_taken()?;
         let done = work(py, threads, |caller| {
-            let picture = render.picture_request()?;
+            let mut picture = render.picture_request()?;
+            picture.settings.threads = threads;
             let planned = plan_picture(&picture, &self.path, &self.loaded, &caller.stop())?;
             Ok(json!(planned.plan))
         })?;

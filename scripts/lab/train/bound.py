@@ -53,21 +53,24 @@ def window_means(planes, reach):
 
 def spread(mean, deviation, samples, alpha=None):
     """The spread [h, w, 3] of an estimate: the larger of a pixel's standard error and a high percentile of its
-    neighbours', of which those count that are not above the pixel by more than the limit of their errors."""
+    neighbours', of which those count that are not above the pixel by more than the limit of their errors, nor below it
+    if all samples of the pixel are equal."""
     known = np.where(np.isfinite(deviation), np.maximum(deviation, 0), np.inf).astype(np.float32)
+    brightest = np.maximum(mean.max(-1), 0)
+    certain = (known <= ROUNDING * brightest[..., None]).all(-1)
+    empty = certain & (brightest == 0) & (False if alpha is None else alpha == 0)
+    exact = certain & (brightest > 0) | empty
     most, found = limit(samples), []
     for c in range(3):
         error, value = known[..., c], mean[..., c]
         errors, values = windows(error, REACH, np.nan), windows(value, REACH, np.nan)
         with np.errstate(invalid="ignore"):
-            errors = np.where(values - value > most * errors, 0, errors)
+            apart = np.where(exact, np.abs(values - value), values - value)
+            errors = np.where(apart > most * errors, 0, errors)
         ranked = np.sort(errors, 0)
         rank = (PERCENTILE * ((~np.isnan(ranked)).sum(0) - 1) + 0.5).astype(int)
-        found.append(np.maximum(error, np.take_along_axis(ranked, rank[None], 0)[0]))
-    brightest = np.maximum(mean.max(-1), 0)
-    empty = (brightest == 0) & (alpha == 0) if alpha is not None else False
-    exact = ((brightest > 0) | empty) & (known <= ROUNDING * brightest[..., None]).all(-1)
-    return np.where(exact[..., None], 0, np.stack(found, -1))
+        found.append(np.maximum(np.where(exact, 0, error), np.take_along_axis(ranked, rank[None], 0)[0]))
+    return np.where(empty[..., None], 0, np.stack(found, -1))
 
 
 def correlation(quarters):

@@ -87,6 +87,7 @@ fn parse(args: &ConvergeArgs, name: &str, options: &str, words: Vec<String>) -> 
         switches: args.scene.switches(),
         iterations: args.iterations,
         time: super::time(args),
+        threads: args.threads,
         ..render.picture_request()?.settings
     };
     let settings = Settings { iterations: None, time: None, ..request.resolve()? };

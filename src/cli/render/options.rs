@@ -101,6 +101,7 @@ impl RenderArgs {
     /// Options contradict each other.
     pub fn picture_request(&self) -> Result<PictureRequest> {
         let mut request = self.options.picture_request()?;
+        request.settings.threads = self.run.threads;
         if self.debug_techniques.is_none() {
             return Ok(request);
         }

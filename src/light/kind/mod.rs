@@ -179,6 +179,16 @@ pub trait Light {
     /// reaches none. `camera`: the ray starts at the camera.
     fn arriving(&self, sky: &Sky, at: &Receiver, d: Vec3, camera: bool) -> Option<Arrival>;
 
+    /// Density with which [`Light::sample`] samples a point of the light for a receiver, or light from infinity, along the
+    /// unit `wi`, over the density with which light paths start there.
+    #[inline]
+    fn relative_density(&self, sky: &Sky, receiver: &Receiver, wi: Vec3) -> f32 {
+        match self.arriving(sky, receiver, wi, false) {
+            Some(Arrival { direct, start, .. }) if start > 0.0 => direct / start,
+            _ => 1.0,
+        }
+    }
+
     /// The bulb that camera paths see, if the light has one.
     fn bulb(&self) -> Option<Bulb> {
         None

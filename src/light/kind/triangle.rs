@@ -158,18 +158,9 @@ impl TriangleLight {
     /// Density per area with which [`Light::sample`] samples a point of the triangle for a receiver, relative to a uniform
     /// one. The point is at a squared distance, and the direction to it has the cosine `cos` to the normal.
     #[inline]
-    pub(in crate::light) fn relative_density(&self, receiver: &Receiver, distance2: f32, cos: f32) -> f32 {
+    pub(in crate::light) fn density_at(&self, receiver: &Receiver, distance2: f32, cos: f32) -> f32 {
         let of = |directions: SphericalTriangle| self.area * cos / (directions.solid_angle() * distance2);
         self.directions(receiver).map_or(1.0, of)
-    }
-
-    /// [`TriangleLight::relative_density`] of the point in the unit direction `wi`.
-    #[inline]
-    pub(in crate::light) fn relative_density_along(&self, receiver: &Receiver, wi: Vec3) -> f32 {
-        let ng = self.normal();
-        let cos = ng.dot(wi);
-        let distance = (self.plane.w - ng.dot(receiver.p)) / cos;
-        self.relative_density(receiver, distance * distance, cos.abs())
     }
 
     /// Barycentric coordinates of the second and the third corner of the point in the unit direction `d` from `p`.
@@ -311,5 +302,13 @@ impl Light for TriangleLight {
     #[inline]
     fn arriving(&self, _: &Sky, _: &Receiver, _: Vec3, _: bool) -> Option<Arrival> {
         None
+    }
+
+    #[inline]
+    fn relative_density(&self, _: &Sky, receiver: &Receiver, wi: Vec3) -> f32 {
+        let ng = self.normal();
+        let cos = ng.dot(wi);
+        let distance = (self.plane.w - ng.dot(receiver.p)) / cos;
+        self.density_at(receiver, distance * distance, cos.abs())
     }
 }

@@ -10,6 +10,7 @@
 
 use super::cost::{Cost, GUIDED_START};
 use super::light_path_ranges::light_path_ranges;
+use crate::camera::Camera;
 use crate::light::{Guide, Region};
 use crate::math::{Rgb, Vec3, luminance};
 use crate::path_class::ClassSet;
@@ -72,8 +73,8 @@ pub(super) fn learn_guide(
     region: Option<Region>,
 ) -> Option<Guide> {
     let seed = settings.seed;
-    let light_paths =
-        ((f64::from(settings.photons) * LIGHT_PATHS_RATIO) as u32).clamp(MIN_LIGHT_PATHS, MAX_LIGHT_PATHS);
+    let light_paths = ((light_paths_of_iteration(camera_paths.camera, settings) * LIGHT_PATHS_RATIO) as u32)
+        .clamp(MIN_LIGHT_PATHS, MAX_LIGHT_PATHS);
     let mut guide = Guide::new(&camera_paths.scene.lights, camera_paths.indirect == Indirect::Photons)?;
     for round in 0..ROUNDS {
         let (maps, walked) =
@@ -93,6 +94,14 @@ pub(super) fn learn_guide(
         guide.learn(&error.of_cells, &paths, &work);
     }
     Some(guide)
+}
+
+fn light_paths_of_iteration(camera: &Camera, settings: &Settings) -> f64 {
+    if settings.method.takes_photon_count() {
+        return f64::from(settings.photons);
+    }
+    let (width, height) = camera.size();
+    f64::from(width) * f64::from(height) * settings.counts.light_paths_per_pixel()
 }
 
 /// The guide for the lights that an iteration sees: the learnt one, or one that is adapted to the moment of a moving

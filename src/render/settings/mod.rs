@@ -113,6 +113,10 @@ pub struct Settings {
     pub iterations: Option<u64>,
     /// Stop after this many wall-clock seconds; `None`: no limit.
     pub time: Option<f64>,
+    /// Number of threads that the user asks for; 0: as many as there are cores. They decide how much work `auto` expects
+    /// within [`Settings::time`].
+    #[serde(skip)]
+    pub threads: usize,
     /// Stop when the estimated relative error is at most this; `None`: no target.
     pub target_error: Option<f64>,
     /// Part of the render's iterations that this process renders.
@@ -146,6 +150,7 @@ impl Default for Settings {
             max_depth: u32::MAX,
             iterations: Some(DEFAULT_ITERATIONS),
             time: None,
+            threads: 0,
             target_error: None,
             shard: Shard { index: 0, count: 1 },
             stop: Stop::default(),

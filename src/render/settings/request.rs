@@ -171,6 +171,10 @@ pub struct SettingsRequest {
     #[serde(skip)]
     #[cfg_attr(feature = "cli", arg(skip))]
     pub network: bool,
+    /// [`Settings::threads`].
+    #[serde(skip)]
+    #[cfg_attr(feature = "cli", arg(skip))]
+    pub threads: usize,
     /// [`Settings::lobes`].
     #[serde(skip)]
     #[cfg_attr(feature = "cli", arg(skip))]
@@ -255,6 +259,7 @@ impl SettingsRequest {
             max_depth: self.max_depth.unwrap_or(default.max_depth),
             iterations: self.iterations.or((!limited).then_some(DEFAULT_ITERATIONS)),
             time: self.time,
+            threads: self.threads,
             target_error: self.target_error,
             shard: self.shard.unwrap_or(default.shard),
             guided: candidate.guided,
