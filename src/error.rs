@@ -22,7 +22,7 @@ pub enum ErrorKind {
     Io,
     /// A shared library (Embree, ONNX Runtime, Open Image Denoise) is missing or unusable.
     Library,
-    /// The file of the combiner's neural network is unusable.
+    /// The file of a neural network is unusable.
     Model,
     /// Stopped by the user (exit code 130); finished work has been written.
     Interrupted,

@@ -127,6 +127,10 @@ fn image_text(path: &Path, set: &LayerSet, object: &Value) -> String {
             text += &format!("{} would take about {} more, {hours:.2} core-hours\n", percent(error), duration(seconds));
         }
         text += &accuracy_text(object);
+        let finish = &object["combined"];
+        if let (Some(model), Some(hash)) = (finish["model"].as_str(), finish["model_hash"].as_str()) {
+            text += &format!("finished with the network {model} (BLAKE3 {hash})\n");
+        }
     }
     for warning in object.get("warnings").and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str) {
         text += &format!("warning: {warning}\n");

@@ -40,7 +40,7 @@ pub struct MergeArgs {
     /// Denoiser: 'auto', 'oidn', 'own' or 'none' [default: as for the shards]
     #[arg(long, value_enum, help_heading = "Finish")]
     denoise: Option<DenoiserChoice>,
-    /// Network that combines five bandwidth levels before denoising [default: as for the shards]
+    /// Network that combines bandwidth levels, or improves the denoised picture [default: as for the shards]
     #[arg(long, value_name = "compact|FILE.onnx", help_heading = "Expert")]
     model: Option<String>,
     /// Layers: 'all', 'comp', 'beauty' or names separated by commas [default: as for the shards]

@@ -18,9 +18,9 @@ pub mod affinity;
 pub mod kernel;
 pub mod model;
 pub mod network;
-mod output;
+pub mod output;
 pub mod runtime;
-mod stack;
+pub(crate) mod stack;
 pub mod tensor;
 pub mod tile;
 
@@ -31,8 +31,10 @@ use rayon::prelude::*;
 
 use crate::error::Result;
 use crate::film::Picture;
-pub use model::Model;
-use network::{Network, Weights};
+use model::OutputForm;
+pub use model::{Model, Purpose};
+pub use network::Network;
+use output::NetworkOutput;
 pub use runtime::Runtime;
 pub use stack::LevelStack;
 use tensor::Normalisation;
@@ -43,13 +45,19 @@ pub struct Combiner {
     network: Network,
 }
 
+/// The network's weights for equation (6) over one tile, in one of two forms.
+#[derive(Debug)]
+enum Weights {
+    /// Affinities from features, see [`affinity`].
+    Features(NetworkOutput),
+    /// Explicit weights for every pixel of the window, see [`kernel`].
+    Kernel(NetworkOutput),
+}
+
 impl Combiner {
-    /// Loads `model` into `runtime`, with the number of threads of the current rayon pool.
-    ///
-    /// # Errors
-    /// [`ErrorKind::Model`](crate::error::ErrorKind::Model): the file is not a network, or not for this program.
-    pub fn new(model: &Model, runtime: &Runtime) -> Result<Self> {
-        Ok(Combiner { network: Network::load(model, runtime, rayon::current_num_threads())? })
+    /// A combiner by a network that outputs weights.
+    pub fn new(network: Network) -> Self {
+        Combiner { network }
     }
 
     /// The network's metadata: its numbers of levels and its window, among others.
@@ -76,16 +84,15 @@ impl Combiner {
         stack.check(metadata.levels)?;
         let valid = stack.valid();
         let normalisation = Normalisation::of(stack);
-        let mut image = Picture::filled(stack.size, [0.0; 3]);
-        for tile in tile::tiles(stack.size, &metadata, pixels) {
-            let input = tensor::fill(stack, &normalisation, tile.input);
-            let weights = self.network.run(&input, tile.input)?;
-            let part = combine_tile(stack, &valid, &tile, &weights);
-            for (y, row) in part.chunks(tile.core.width()).enumerate() {
-                let start = (tile.core.y0 + y) * stack.size.width + tile.core.x0;
-                image[start..start + row.len()].copy_from_slice(row);
-            }
-        }
+        let input = |rect| tensor::fill(stack, &normalisation, rect);
+        let combined = |tile: &Tile, output| {
+            let weights = match metadata.form {
+                OutputForm::Weights => Weights::Kernel(output),
+                _ => Weights::Features(output),
+            };
+            combine_tile(stack, &valid, tile, &weights)
+        };
+        let mut image = self.network.run_tiled(stack.size, pixels, input, combined)?;
         stack::fill_invalid(stack, &valid, metadata.window / 2, &mut image);
         Ok(image)
     }

@@ -15,6 +15,15 @@ pub struct Model {
     pub(super) bytes: Cow<'static, [u8]>,
 }
 
+/// Purpose of a network.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// It combines bandwidth levels by equation (6).
+    Levels,
+    /// It makes the picture towards which the finish moves an estimate of one level.
+    Finish,
+}
+
 impl Model {
     /// The network `compact`, which ships with the program; `models/compact.txt` describes its training.
     pub fn compact() -> Self {
@@ -24,7 +33,7 @@ impl Model {
     /// Reads a network made by `scripts/lab/train/export_network.py`.
     ///
     /// # Errors
-    /// [`ErrorKind::Io`]: the file cannot be read. Its contents are checked by [`Combiner::new`](super::Combiner::new).
+    /// [`ErrorKind::Io`]: the file cannot be read. Its contents are checked by [`Network::load`](super::Network::load).
     pub fn from_file(path: &Path) -> Result<Self> {
         let bytes = files::read(path).map_err(|cause| {
             Error::io(path, &cause)
@@ -49,11 +58,28 @@ impl Model {
             path => Model::from_file(Path::new(path)),
         }
     }
+
+    /// The network's purpose by the bytes of its metadata. Options depend on it before ONNX Runtime is loaded.
+    pub fn purpose(&self) -> Purpose {
+        const FINISH: &[u8] = b"caustique.kind\x12\x06finish";
+        let is_finish = self.bytes.windows(FINISH.len()).any(|bytes| bytes == FINISH);
+        if is_finish { Purpose::Finish } else { Purpose::Levels }
+    }
+
+    /// BLAKE3 hash of the network's file, in hexadecimal digits.
+    pub fn hash(&self) -> String {
+        blake3::hash(&self.bytes).to_hex().to_string()
+    }
 }
 
-/// The form in which a network outputs the weights of equation (6).
+/// Version of the input planes of networks of the finish. `finish/network.rs` makes the planes.
+pub const FINISH_VERSION: usize = 1;
+/// Number of these planes.
+pub const FINISH_PLANES: usize = 24;
+
+/// The form of a network's output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WeightForm {
+pub enum OutputForm {
     /// Output tensor `features`: affinities of pairs of pixels follow from per-pixel features, see
     /// [`affinity`](super::affinity).
     Features {
@@ -63,14 +89,16 @@ pub enum WeightForm {
     /// Output tensor `weights`: a weight for every pair of levels and every pixel of the window, see
     /// [`kernel`](super::kernel).
     Weights,
+    /// Output tensor `picture`: the picture itself, in the exposure of the input planes.
+    Picture,
 }
 
 /// Metadata of a network file: the form of its output, and the sizes of its input and window.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Metadata {
-    /// Form in which the network outputs the weights.
-    pub form: WeightForm,
-    /// Number of bandwidth levels in the network's input, m.
+    /// Form of the network's output.
+    pub form: OutputForm,
+    /// Number of bandwidth levels in the network's input, m; 1 for a network of the finish.
     pub levels: usize,
     /// Pixels along the side of the square window of equation (6), odd.
     pub window: usize,
@@ -102,15 +130,32 @@ impl Metadata {
             let parsed = value.parse().ok().filter(|n| (least..=most).contains(n));
             parsed.ok_or_else(|| format!("its caustique.{key} is {value:?}, not a number from {least} to {most}"))
         };
-        let version = number("normalisation", 0, u32::MAX as usize)?;
-        if version != tensor::VERSION as usize {
-            return Err(format!("it expects input version {version}, this program makes {}", tensor::VERSION));
+        let kind = text("kind")?;
+        let (key, made) =
+            if kind == "finish" { ("version", FINISH_VERSION) } else { ("normalisation", tensor::VERSION as usize) };
+        let version = number(key, 0, u32::MAX as usize)?;
+        if version != made {
+            return Err(format!("it expects input version {version}, this program makes {made}"));
         }
-        let form = match text("kind")?.as_str() {
-            "features" => WeightForm::Features { dimensions: number("features", 1, super::affinity::MAX_DIMENSIONS)? },
-            "weights" => WeightForm::Weights,
-            other => return Err(format!("its caustique.kind is {other:?}, neither features nor weights")),
+        let form = match kind.as_str() {
+            "features" => OutputForm::Features { dimensions: number("features", 1, super::affinity::MAX_DIMENSIONS)? },
+            "weights" => OutputForm::Weights,
+            "finish" => OutputForm::Picture,
+            other => return Err(format!("its caustique.kind is {other:?}, not features, weights or finish")),
         };
+        let of_picture = Metadata {
+            form,
+            levels: 1,
+            window: 1,
+            dilations: vec![1],
+            identities: Vec::new(),
+            stride: number("stride", 1, 64)?,
+            halo: number("halo", 0, 1024)?,
+            training: get("training").unwrap_or_else(|| "not said".into()),
+        };
+        if form == OutputForm::Picture {
+            return Ok(of_picture);
+        }
         let window = number("window", 1, 63)?;
         if window % 2 == 0 {
             return Err(format!("its window of {window} pixels has no centre"));
@@ -131,26 +176,26 @@ impl Metadata {
         if dilations.is_empty() || dilations.len() > MAX_DILATIONS {
             return Err(format!("it has {} dilations, not 1 to {MAX_DILATIONS}", dilations.len()));
         }
-        if form == WeightForm::Weights && (dilations != [1] || !identities.is_empty()) {
+        if form == OutputForm::Weights && (dilations != [1] || !identities.is_empty()) {
             return Err("it has dilations or identities, which need the kind features".into());
         }
-        Ok(Metadata {
-            form,
-            levels,
-            window,
-            dilations,
-            identities,
-            stride: number("stride", 1, 64)?,
-            halo: number("halo", 0, 1024)?,
-            training: get("training").unwrap_or_else(|| "not said".into()),
-        })
+        Ok(Metadata { levels, window, dilations, identities, ..of_picture })
     }
 
-    /// Name of the network's output tensor: `features` or `weights`.
+    /// Number of channels of the network's input tensor, `input`.
+    pub fn input_channels(&self) -> usize {
+        match self.form {
+            OutputForm::Picture => FINISH_PLANES,
+            _ => tensor::channels(self.levels),
+        }
+    }
+
+    /// Name of the network's output tensor: `features`, `weights` or `picture`.
     pub fn output(&self) -> &'static str {
         match self.form {
-            WeightForm::Features { .. } => "features",
-            WeightForm::Weights => "weights",
+            OutputForm::Features { .. } => "features",
+            OutputForm::Weights => "weights",
+            OutputForm::Picture => "picture",
         }
     }
 
@@ -158,23 +203,24 @@ impl Metadata {
     pub fn output_channels(&self) -> usize {
         let pairs = self.levels - 1;
         match self.form {
-            WeightForm::Features { dimensions } => {
+            OutputForm::Features { dimensions } => {
                 self.dilations.len() * pairs * (dimensions + super::affinity::SCALARS) + self.identities.len()
             }
-            WeightForm::Weights => pairs * self.window * self.window,
+            OutputForm::Weights => pairs * self.window * self.window,
+            OutputForm::Picture => 3,
         }
     }
 
     /// Radius in pixels of the network output that the result at a pixel depends on.
     pub fn neighbour_radius(&self) -> usize {
         match self.form {
-            WeightForm::Features { .. } => self.window / 2 * self.dilations.iter().copied().max().unwrap_or(1),
-            WeightForm::Weights => 0,
+            OutputForm::Features { .. } => self.window / 2 * self.dilations.iter().copied().max().unwrap_or(1),
+            OutputForm::Weights | OutputForm::Picture => 0,
         }
     }
 
     /// Number of pixels of the tiles in which the network is run.
-    pub(super) fn tile_pixels(&self) -> usize {
+    pub(crate) fn tile_pixels(&self) -> usize {
         (MAX_TILE_FLOATS / self.output_channels()).min(MAX_TILE_PIXELS)
     }
 }

@@ -4,21 +4,13 @@ use ort::session::Session;
 use ort::session::builder::GraphOptimizationLevel;
 use ort::value::{Outlet, TensorRef, ValueType};
 
-use super::model::{Metadata, Model, WeightForm};
+use super::model::{Metadata, Model};
 use super::output::{NetworkOutput, Rect};
 use super::runtime::Runtime;
-use super::tensor;
+use super::tile::{self, Tile};
 use crate::error::{Error, ErrorKind, Result};
+use crate::film::{Picture, Size};
 use crate::system::SilencedStderr;
-
-/// The network's weights for equation (6) over one tile, in one of two forms.
-#[derive(Debug)]
-pub enum Weights {
-    /// Affinities from features, see [`affinity`](super::affinity).
-    Features(NetworkOutput),
-    /// Explicit weights for every pixel of the window, see [`kernel`](super::kernel).
-    Kernel(NetworkOutput),
-}
 
 /// A neural network that is loaded for inference.
 pub struct Network {
@@ -51,15 +43,38 @@ impl Network {
         &self.metadata
     }
 
-    /// Runs the network on `input`, the tensor of `rect` from [`tensor::fill`].
+    /// Makes a picture in tiles of about `pixels` pixels each. `input` makes the network's input of a rectangle, see
+    /// [`rows`](super::tensor::rows), `colours` the pixels of a tile's core from the output, row by row.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub fn run_tiled(
+        &mut self,
+        size: Size,
+        pixels: usize,
+        input: impl Fn(Rect) -> Vec<f32>,
+        colours: impl Fn(&Tile, NetworkOutput) -> Vec<[f32; 3]>,
+    ) -> Result<Picture> {
+        let mut image = Picture::filled(size, [0.0; 3]);
+        for tile in tile::tiles(size, &self.metadata, pixels) {
+            let output = self.run(&input(tile.input), tile.input)?;
+            for (y, row) in colours(&tile, output).chunks(tile.core.width()).enumerate() {
+                let start = (tile.core.y0 + y) * size.width + tile.core.x0;
+                image[start..start + row.len()].copy_from_slice(row);
+            }
+        }
+        Ok(image)
+    }
+
+    /// Runs the network on `input`, the tensor of `rect`.
     ///
     /// # Errors
     /// [`ErrorKind::Model`]: ONNX Runtime fails or the output has the wrong shape.
-    pub fn run(&mut self, input: &[f32], rect: Rect) -> Result<Weights> {
+    pub fn run(&mut self, input: &[f32], rect: Rect) -> Result<NetworkOutput> {
         let Network { session, metadata, name } = self;
         let fail =
             |cause: &dyn std::fmt::Display| Error::new(ErrorKind::Model, format!("model {name}"), one_line(cause));
-        let shape = [1, tensor::channels(metadata.levels), rect.height(), rect.width()];
+        let shape = [1, metadata.input_channels(), rect.height(), rect.width()];
         let tensor = TensorRef::from_array_view((shape, input)).map_err(|cause| fail(&cause))?;
         let outputs = session.run(ort::inputs!["input" => tensor]).map_err(|cause| fail(&cause))?;
         let output = outputs.get(metadata.output()).ok_or_else(|| fail(&"the output is missing"))?;
@@ -69,11 +84,7 @@ impl Network {
             return Err(fail(&format!("the output has shape {shape:?} instead of {expected:?}")));
         }
         let (dilations, identities) = (metadata.dilations.clone(), metadata.identities.clone());
-        let output = NetworkOutput { rect, window: metadata.window, dilations, identities, data: data.to_vec() };
-        Ok(match metadata.form {
-            WeightForm::Features { .. } => Weights::Features(output),
-            WeightForm::Weights => Weights::Kernel(output),
-        })
+        Ok(NetworkOutput { rect, window: metadata.window, dilations, identities, data: data.to_vec() })
     }
 }
 
@@ -96,7 +107,7 @@ fn check_outlets(session: &Session, metadata: &Metadata) -> std::result::Result<
         let found = outlets.iter().find(|outlet| outlet.name() == name);
         channels(name, found.ok_or_else(|| format!("it has no tensor named {name:?}"))?.dtype())
     };
-    let expected = [("input", tensor::channels(metadata.levels)), (metadata.output(), metadata.output_channels())];
+    let expected = [("input", metadata.input_channels()), (metadata.output(), metadata.output_channels())];
     let found = [find(session.inputs(), "input")?, find(session.outputs(), metadata.output())?];
     for ((name, expected), found) in expected.into_iter().zip(found) {
         // A negative number is a dynamic size.

@@ -36,14 +36,13 @@ impl LevelStack {
             let error = Error::new(ErrorKind::Image, "", "the file has no bandwidth levels (Level1, Level2, ...)");
             return Err(error.hint("render with --layers all"));
         }
-        let depth = set.find(Role::Depth).and_then(|layer| layer.planes.first());
         Ok(LevelStack {
             size: set.size(),
             levels,
             variances: numbered("Variance"),
             albedo: of_role(Role::Albedo),
             normal: of_role(Role::Normal),
-            depth: depth.map(|plane| plane.values.clone()).unwrap_or_default(),
+            depth: depth_of(set),
         })
     }
 
@@ -55,25 +54,15 @@ impl LevelStack {
             return Err(Error::new(ErrorKind::Image, "", format!("an image of {width} x {height} pixels")));
         }
         let count = self.levels.len();
-        if count != expected {
-            let cause = format!("the image has {count} levels, the network takes {expected}");
-            return Err(Error::new(ErrorKind::Image, "", cause)
-                .hint(format!("render with --levels {expected}, or give a network trained for {count} with --model")));
-        }
-        let plane = |name: String, size: usize| {
-            if size == pixels {
-                return Ok(());
-            }
-            let cause = format!("the layer holds {size} pixels, the image {pixels}");
-            Err(Error::new(ErrorKind::Image, format!("layer {name}"), cause).hint("render with --layers all"))
-        };
+        check_levels(count, expected)?;
         for index in 0..count {
-            plane(format!("Level{}", index + 1), self.levels[index].len())?;
-            plane(format!("Variance{}", index + 1), self.variances.get(index).map_or(0, |plane| plane.len()))?;
+            check_layer(&format!("Level{}", index + 1), self.levels[index].len(), pixels)?;
+            let variance = self.variances.get(index).map_or(0, |plane| plane.len());
+            check_layer(&format!("Variance{}", index + 1), variance, pixels)?;
         }
-        plane("albedo".into(), self.albedo.len())?;
-        plane("normal".into(), self.normal.len())?;
-        plane("depth".into(), self.depth.len())
+        check_layer("albedo", self.albedo.len(), pixels)?;
+        check_layer("normal", self.normal.len(), pixels)?;
+        check_layer("depth", self.depth.len(), pixels)
     }
 
     /// Whether each pixel is finite in all bandwidth levels; only such pixels take part in equation (6).
@@ -81,6 +70,31 @@ impl LevelStack {
         let at = |i: usize| self.levels.iter().all(|level| level[i].iter().all(|v| v.is_finite()));
         (0..self.size.pixels()).into_par_iter().map(at).collect()
     }
+}
+
+/// The layer `depth` of a set; empty if it has none.
+pub(crate) fn depth_of(set: &LayerSet) -> Vec<f32> {
+    let plane = set.find(Role::Depth).and_then(|layer| layer.planes.first());
+    plane.map(|plane| plane.values.clone()).unwrap_or_default()
+}
+
+/// Checks that a picture of `count` bandwidth levels has as many as a network expects.
+pub(crate) fn check_levels(count: usize, expected: usize) -> Result<()> {
+    if count == expected {
+        return Ok(());
+    }
+    let cause = format!("the image has {count} levels, the network takes {expected}");
+    Err(Error::new(ErrorKind::Image, "", cause)
+        .hint(format!("render with --levels {expected}, or give a network trained for {count} with --model")))
+}
+
+/// Checks that a layer that a network reads, of `size` pixels, has as many as the picture.
+pub(crate) fn check_layer(name: &str, size: usize, pixels: usize) -> Result<()> {
+    if size == pixels {
+        return Ok(());
+    }
+    let cause = format!("the layer holds {size} pixels, the image {pixels}");
+    Err(Error::new(ErrorKind::Image, format!("layer {name}"), cause).hint("render with --layers all"))
 }
 
 /// Fills every pixel of `image` that is not valid with its first finite level, else with the mean of level 1 over valid

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::output::Rect;
 use super::stack::LevelStack;
-use crate::film::Picture;
+use crate::film::{Picture, Size};
 use crate::stat::median;
 
 /// Version of the order and scaling of the network's input channels. A network's metadata states the version of its
@@ -18,7 +18,7 @@ pub const VERSION: u32 = 1;
 const DEVIATION_FLOOR: f32 = 1e-3;
 
 /// Depths from this value on, in scene units, are background (the EXR stores 1e10).
-const BACKGROUND_DEPTH: f32 = 1e9;
+pub const BACKGROUND_DEPTH: f32 = 1e9;
 
 /// The exposure leaves out the brightest 1 / `TRIMMED` of the pixels that are not black.
 const TRIMMED: usize = 100;
@@ -60,9 +60,14 @@ pub struct Normalisation {
 }
 
 impl Normalisation {
+    /// The scales of a picture by its smoothest estimate and its depth; 1 for an image without light or depth.
+    pub fn new(smoothest: Option<&Picture>, depth: &[f32]) -> Self {
+        Normalisation { exposure: exposure(smoothest), depth: median_depth(depth) }
+    }
+
     /// The scales of the picture in `stack`; 1 for an image without light or depth.
     pub fn of(stack: &LevelStack) -> Self {
-        Normalisation { exposure: exposure(stack.levels.last()), depth: median_depth(&stack.depth) }
+        Normalisation::new(stack.levels.last(), &stack.depth)
     }
 }
 
@@ -92,18 +97,22 @@ fn median_depth(depth: &[f32]) -> f32 {
 /// The network's input for the pixels of `rect`, `[channel][y][x]`; zero outside the image, like the padding of a
 /// convolution.
 pub fn fill(stack: &LevelStack, normalisation: &Normalisation, rect: Rect) -> Vec<f32> {
-    let (width, area) = (rect.width(), rect.width() * rect.height());
     let order = order(stack.levels.len());
-    let mut data = vec![0.0; order.len() * area];
+    rows(stack.size, order.len(), rect, |channel, start, out| row(stack, normalisation, order[channel], start, out))
+}
+
+/// A network's input of `channels` channels for the pixels of `rect` of a picture, `[channel][y][x]`; zero outside the
+/// picture. `row` fills part of a row of a channel with consecutive pixels from an index on.
+pub fn rows(size: Size, channels: usize, rect: Rect, row: impl Fn(usize, usize, &mut [f32]) + Sync) -> Vec<f32> {
+    let mut data = vec![0.0; channels * rect.width() * rect.height()];
     // One chunk per row and channel: their size does not depend on the number of threads.
-    data.par_chunks_mut(width).enumerate().for_each(|(k, out)| {
-        let (channel, y) = (order[k / rect.height()], rect.y0 + k % rect.height());
-        if y >= stack.size.height {
+    data.par_chunks_mut(rect.width()).enumerate().for_each(|(k, out)| {
+        let (channel, y) = (k / rect.height(), rect.y0 + k % rect.height());
+        if y >= size.height {
             return;
         }
-        let start = y * stack.size.width + rect.x0;
-        let count = width.min(stack.size.width.saturating_sub(rect.x0));
-        row(stack, normalisation, channel, start, &mut out[..count]);
+        let count = rect.width().min(size.width.saturating_sub(rect.x0));
+        row(channel, y * size.width + rect.x0, &mut out[..count]);
     });
     data
 }

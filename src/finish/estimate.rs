@@ -97,8 +97,12 @@ pub(super) fn estimate_layers(set: &LayerSet) -> impl Iterator<Item = &Layer> {
 
 /// Number, from 1, of the bandwidth level that is the method's own image: the second largest.
 pub(super) fn own_level(set: &LayerSet) -> usize {
-    let count = (1..).take_while(|level| set.get(&format!("Variance{level}")).is_some()).count();
-    count.saturating_sub(1).max(1)
+    level_count(set).saturating_sub(1).max(1)
+}
+
+/// Number of bandwidth levels of a picture; 0 if it is another renderer's.
+pub(super) fn level_count(set: &LayerSet) -> usize {
+    (1..).take_while(|level| set.get(&format!("Variance{level}")).is_some()).count()
 }
 
 /// Coverage of each pixel, 0 to 1; `None` if the beauty has no alpha.

@@ -2,7 +2,7 @@
 //!
 //! 1. The estimate `M`: the single-bandwidth image, or the bandwidth levels combined by equation (6) of the 2021 paper
 //!    if the user has asked for its network.
-//! 2. The picture `D` that a denoiser makes of it ([`denoiser`]).
+//! 2. The picture `D` that a denoiser makes of it ([`denoiser`]), or that a network makes of both ([`network`]).
 //! 3. `out = M + clip(D - M, -c s, c s)` ([`mod@bound`]), which is consistent for any `D`. The total light of the picture
 //!    is kept (`conserve.rs`).
 //! 4. The additive parts, finished so that they sum to the picture ([`parts`]).
@@ -18,6 +18,7 @@ pub mod denoiser;
 mod estimate;
 mod finished_error;
 mod grey;
+pub mod network;
 pub mod parts;
 pub mod statistical;
 pub mod temporal;
@@ -29,7 +30,8 @@ pub use estimate::{Estimate, quarters};
 pub use finished_error::{DEFAULT_CONVERGENCE_RATE, ErrorMap, FinishedError};
 pub use window::{Windows, window};
 
-use crate::combine::{Combiner, LevelStack};
+use crate::combine::model::OutputForm;
+use crate::combine::{Combiner, LevelStack, Network};
 use crate::error::{Error, Result};
 use crate::estimator::QUARTERS;
 use crate::film::kind::{SQUARED_BIAS, Use};
@@ -42,6 +44,7 @@ use crate::system;
 use bound::Noise;
 use estimate::{alpha, estimate_layers, own_level};
 use finished_error::ErrorEstimator;
+use network::{FinishNetwork, Planes};
 use parts::Part;
 use rayon::prelude::*;
 
@@ -94,14 +97,6 @@ pub fn bytes_for_error(pixels: u64, denoiser: DenoiserChoice) -> u64 {
     held(pixels, denoiser) + pixels * BYTES_PER_PIXEL_OF_ERROR
 }
 
-/// Checks that there is memory to finish a layer set, as far as its size and its `parts` parts decide.
-fn require_memory(set: &LayerSet, parts: usize, denoiser: &Denoiser) -> Result<()> {
-    let (width, height) = (set.width, set.height);
-    let needed = bytes(width as u64 * height as u64, parts as u64, denoiser.choice());
-    let outcome = memory::require(needed, format_args!("finishing {width} x {height} pixels with {parts} parts"));
-    outcome.map_err(|error| error.hint("finish the picture where more memory is free, or with fewer --layers"))
-}
-
 /// The finish of renders: denoises pictures within the limits that their standard errors set, and splits them into
 /// layers.
 pub struct Finish {
@@ -114,7 +109,10 @@ pub struct Finish {
     pub quality: Quality,
     /// Ends a run of Open Image Denoise early, which is an error then; `None`: each run goes to its end.
     pub stop: Option<Stop>,
-    network: Option<Combiner>,
+    /// The network that combines bandwidth levels to the estimate; `None` without one.
+    combiner: Option<Combiner>,
+    /// The network that makes the picture towards which the estimate moves; `None`: that is the denoised picture.
+    network: Option<FinishNetwork>,
 }
 
 /// The result of [`Finish::apply`], beside the layers.
@@ -269,15 +267,35 @@ fn part_layers(set: &LayerSet) -> impl Iterator<Item = &Layer> {
 }
 
 impl Finish {
-    /// A finish by the chosen denoiser ([`Denoiser::open`]), and by the network that combines bandwidth levels with
-    /// equation (6), if there is one.
+    /// A finish by the chosen denoiser ([`Denoiser::open`]), and by a network, if there is one: it combines bandwidth
+    /// levels with equation (6), or is one of the finish.
     ///
     /// # Errors
     /// As for [`Denoiser::open`].
-    pub fn open(choice: DenoiserChoice, network: Option<Combiner>) -> Result<(Finish, Option<Error>)> {
+    pub fn open(choice: DenoiserChoice, network: Option<Network>) -> Result<(Finish, Option<Error>)> {
         let (denoiser, missing) = Denoiser::open(choice)?;
         let unbounded = choice == DenoiserChoice::Full;
-        Ok((Finish { denoiser, unbounded, preview: false, quality: Quality::High, stop: None, network }, missing))
+        let is_picture = |network: &Network| network.metadata().form == OutputForm::Picture;
+        let (network, combiner) = match network {
+            Some(network) if is_picture(&network) => (Some(FinishNetwork::new(network)), None),
+            other => (None, other.map(Combiner::new)),
+        };
+        let (preview, quality, stop) = (false, Quality::High, None);
+        Ok((Finish { denoiser, unbounded, preview, quality, stop, combiner, network }, missing))
+    }
+
+    /// Bytes that a finish of a picture of `pixels` pixels and `parts` additive parts takes besides its layers.
+    fn bytes(&self, pixels: u64, parts: u64) -> u64 {
+        let of_network = if self.network.is_some() { network::bytes(pixels) } else { 0 };
+        bytes(pixels, parts, self.denoiser.choice()) + of_network
+    }
+
+    /// Checks that there is memory to finish a layer set, as far as its size and its `parts` parts decide.
+    fn require_memory(&self, set: &LayerSet, parts: usize) -> Result<()> {
+        let (width, height) = (set.width, set.height);
+        let needed = self.bytes(width as u64 * height as u64, parts as u64);
+        let outcome = memory::require(needed, format_args!("finishing {width} x {height} pixels with {parts} parts"));
+        outcome.map_err(|error| error.hint("finish the picture where more memory is free, or with fewer --layers"))
     }
 
     /// Name of the denoiser, with the version of Open Image Denoise, and whether its pictures are not bounded.
@@ -305,24 +323,42 @@ impl Finish {
         finished.map(|_| ())
     }
 
+    /// Runs the network of the finish, if there is one, on a grey picture, so that the caller can time it.
+    ///
+    /// # Errors
+    /// The network fails.
+    pub fn warm_up_network(&mut self, size: Size) -> Result<()> {
+        self.network.as_mut().map_or(Ok(()), |network| network.warm_up(size))
+    }
+
     /// Whether the denoiser has levels of quality, as Open Image Denoise has.
     pub fn has_qualities(&self) -> bool {
         matches!(self.denoiser, Denoiser::Oidn { .. })
     }
 
-    /// The finished picture of an unfinished estimate.
+    /// The finished picture of an unfinished estimate, without the network.
     ///
     /// # Errors
     /// The denoiser fails.
     pub fn picture(&mut self, estimate: &Estimate) -> Result<Picture> {
-        self.with_spread(estimate).map(|([picture, _], _)| picture)
+        self.half(estimate, None)
     }
 
-    /// The finished picture and the [spread](bound::spread) that limits its displacement, and the numbers of clamped
-    /// pixels.
-    fn with_spread(&mut self, estimate: &Estimate) -> Result<([Picture; 2], Clamped)> {
+    /// The finished picture of an estimate whose additive parts are unknown, such as one by half of the iterations.
+    fn half(&mut self, estimate: &Estimate, planes: Option<&Planes>) -> Result<Picture> {
+        let denoised = self.denoised(estimate, planes, false)?;
+        let ([picture, _], _) = self.displaced(estimate, &denoised);
+        Ok(picture)
+    }
+
+    /// The picture towards which an estimate moves: the denoised one, or that of the network, which reads `planes`.
+    /// `has_parts`: whether the additive parts in `planes` are those of this estimate.
+    fn denoised(&mut self, estimate: &Estimate, planes: Option<&Planes>, has_parts: bool) -> Result<Picture> {
         let denoised = self.denoiser.run(estimate, self.quality, self.stop.as_ref())?;
-        Ok(self.displaced(estimate, &denoised))
+        match (&mut self.network, planes) {
+            (Some(network), Some(planes)) => network.run(planes, estimate, &denoised, has_parts),
+            _ => Ok(denoised),
+        }
     }
 
     /// An estimate after its bounded displacement towards its denoised picture, the [spread](bound::spread) that limits
@@ -338,21 +374,24 @@ impl Finish {
         if self.unbounded || self.preview { Noise { limit: f32::INFINITY, ..noise } } else { noise }
     }
 
-    /// The estimate in a layer set; its guides have no noise, unless it is for a preview.
-    fn guided(&mut self, set: &LayerSet) -> Result<Estimate> {
+    /// The estimate in a layer set, and what the network of the finish reads beside it. The guides of the estimate have
+    /// no noise, unless it is for a preview, which does without the network.
+    fn guided(&mut self, set: &LayerSet) -> Result<(Estimate, Option<Planes>)> {
         let mut estimate = Estimate::of(set)?;
-        if !self.preview {
-            self.denoiser.clean_guides(&mut estimate, self.stop.as_ref())?;
+        if self.preview {
+            return Ok((estimate, None));
         }
-        Ok(estimate)
+        let planes = self.network.as_ref().map(|_| Planes::of(set, &estimate)).transpose()?;
+        self.denoiser.clean_guides(&mut estimate, self.stop.as_ref())?;
+        Ok((estimate, planes))
     }
 
-    /// The estimate in a layer set, and the number of bandwidth levels that the network has combined to it.
-    fn estimate(&mut self, set: &LayerSet) -> Result<(Estimate, Option<usize>)> {
-        let mut estimate = self.guided(set)?;
-        let Some(network) = &mut self.network else { return Ok((estimate, None)) };
-        estimate.mean = network.run(&LevelStack::of(set)?)?;
-        Ok((estimate, Some(network.metadata().levels)))
+    /// [`guided`](Self::guided), and the number of bandwidth levels that a network has combined to the estimate.
+    fn estimate(&mut self, set: &LayerSet) -> Result<(Estimate, Option<Planes>, Option<usize>)> {
+        let (mut estimate, planes) = self.guided(set)?;
+        let Some(combiner) = &mut self.combiner else { return Ok((estimate, planes, None)) };
+        estimate.mean = combiner.run(&LevelStack::of(set)?)?;
+        Ok((estimate, planes, Some(combiner.metadata().levels)))
     }
 
     /// Finishes the picture of the layer set and makes the result its beauty; alpha stays. Adds `Error`,
@@ -363,10 +402,12 @@ impl Finish {
     /// Layers are missing ([`Estimate::of`]), or the denoiser or the network fails; the set is unchanged then.
     pub fn apply(&mut self, set: &mut LayerSet, wanted: impl Fn(&str) -> bool) -> Result<Finished> {
         let names = parts_to_finish(set, &wanted);
-        require_memory(set, names.len(), &self.denoiser)?;
-        let (estimate, combined) = self.estimate(set)?;
-        let denoised = self.denoiser.run(&estimate, self.quality, self.stop.as_ref())?;
-        let half = quarters(set).map(|quarters| self.picture(&estimate.first_half(&quarters))).transpose()?;
+        self.require_memory(set, names.len())?;
+        let (estimate, planes, combined) = self.estimate(set)?;
+        let denoised = self.denoised(&estimate, planes.as_ref(), true)?;
+        let of_half = quarters(set).map(|quarters| estimate.first_half(&quarters));
+        let half = of_half.map(|of_half| self.half(&of_half, planes.as_ref())).transpose()?;
+        drop(planes);
         let parts = names.into_iter().filter_map(|name| set.picture(&name).map(|picture| (name, picture))).collect();
         let error = ErrorSource::of(set, own_level(set));
         let prepared = Prepared { estimate, denoised, half, combined, parts, colors: lobe_colors(set) };
@@ -375,7 +416,8 @@ impl Finish {
 
     /// Names of the layers of a set, which may lack its values, that [`Finish::frame`] reads.
     pub fn frame_layers(&self, set: &LayerSet) -> Vec<String> {
-        let by_network = |name: &str| self.network.is_some() && reads_for_error(name);
+        let has_network = self.combiner.is_some() || self.network.is_some();
+        let by_network = |name: &str| has_network && reads_for_error(name);
         let of_network = set.layers.iter().filter(|layer| by_network(&layer.name));
         let layers = estimate_layers(set).chain(temporal::motion_layers(set)).chain(part_layers(set)).chain(of_network);
         layers.map(|layer| layer.name.clone()).collect()
@@ -391,7 +433,7 @@ impl Finish {
         let channels = set.layers.iter().map(|layer| layer.planes.len() as u64).sum::<u64>();
         let held = frames as u64 * pixels * temporal::bytes_per_pixel(parts);
         // The layers that the finish leaves as they are come last.
-        let needed = held + bytes(pixels, parts, self.denoiser.choice()).max(4 * channels * pixels);
+        let needed = held + self.bytes(pixels, parts).max(4 * channels * pixels);
         let outcome = memory::require(needed, format_args!("{frames} frames of {width} x {height} pixels"));
         outcome.map_err(|error| error.hint("finish the frames where more memory is free, or with fewer --layers"))
     }
@@ -401,8 +443,8 @@ impl Finish {
     /// # Errors
     /// Layers are missing ([`Estimate::of`]), motion vectors too, or the denoiser or the network fails.
     pub fn frame(&mut self, set: LayerSet) -> Result<temporal::Frame> {
-        require_memory(&set, part_layers(&set).count(), &self.denoiser)?;
-        let (estimate, combined) = self.estimate(&set)?;
+        self.require_memory(&set, part_layers(&set).count())?;
+        let (estimate, planes, combined) = self.estimate(&set)?;
         let quarters = quarters(&set);
         let motion = temporal::motion(&set)?;
         let parts = part_layers(&set).map(|layer| (layer.name.clone(), set.picture_of(layer))).collect();
@@ -413,10 +455,10 @@ impl Finish {
         if let Some(quarters) = quarters {
             let of_half = estimate.first_half(&quarters);
             drop(quarters);
-            let denoised = self.denoiser.run(&of_half, self.quality, self.stop.as_ref())?;
+            let denoised = self.denoised(&of_half, planes.as_ref(), false)?;
             half = Some([of_half.mean, denoised]);
         }
-        let denoised = self.denoiser.run(&estimate, self.quality, self.stop.as_ref())?;
+        let denoised = self.denoised(&estimate, planes.as_ref(), true)?;
         let is_denoised = !matches!(self.denoiser, Denoiser::None);
         let pictures = temporal::Pictures { estimate, denoised, half, combined, is_denoised };
         Ok(temporal::Frame::new(pictures, parts, motion, correlation))
@@ -461,8 +503,9 @@ impl Finish {
     /// # Errors
     /// Layers are missing, or the denoiser fails.
     pub fn estimate_error(&mut self, set: &LayerSet) -> Result<Option<FinishedError>> {
-        let estimate = self.guided(set)?;
-        let half = quarters(set).map(|quarters| self.picture(&estimate.first_half(&quarters))).transpose()?;
+        let (estimate, planes) = self.guided(set)?;
+        let of_half = quarters(set).map(|quarters| estimate.first_half(&quarters));
+        let half = of_half.map(|of_half| self.half(&of_half, planes.as_ref())).transpose()?;
         let source = ErrorSource::of(set, own_level(set));
         Ok(half.zip(source).map(|(half, source)| error_by_quarters(&source, &estimate, &half, false).0))
     }

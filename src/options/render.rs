@@ -119,7 +119,7 @@ impl RenderOptions {
     pub fn settings_request(&self) -> SettingsRequest {
         SettingsRequest {
             seed: self.frame_seed(),
-            network: self.finish.model.is_some(),
+            network: self.finish.purpose(),
             switches: self.scene.switches(),
             ..self.settings.clone()
         }

@@ -1,6 +1,7 @@
 //! Opens the finish of a render: finds the denoiser, loads the network, and reserves time for both.
 
-use crate::combine::{Combiner, Model, Runtime};
+use crate::combine::model::OutputForm;
+use crate::combine::{Model, Network, Runtime};
 use crate::error::{Error, Result};
 use crate::film::{LayerSet, Size};
 use crate::finish::{DenoiserChoice, Finish, Finished, Quality};
@@ -19,8 +20,8 @@ const MAX_FINISH_SHARE: f64 = 0.5;
 pub struct FinishRequest {
     /// The denoiser that the user asks for.
     pub denoiser: DenoiserChoice,
-    /// The network of equation (6), which combines bandwidth levels: the name of a built-in network, or an ONNX file;
-    /// `None`: levels are not combined.
+    /// The network of equation (6), which combines bandwidth levels, or one of the finish: the name of a built-in
+    /// network, or an ONNX file; `None`: no network.
     pub model: Option<String>,
 }
 
@@ -33,14 +34,16 @@ pub fn missing_denoiser(error: &Error) -> String {
 /// A finish (denoiser and network) whose libraries have been found and whose network has been loaded.
 pub struct OpenFinish {
     finish: Finish,
-    model: Option<Network>,
+    model: Option<NetworkFacts>,
     /// Why the preferred denoiser is missing, if the built-in one takes its place; `None` otherwise.
     pub missing: Option<Error>,
 }
 
-/// Name and training of a network.
-struct Network {
+/// What the header of a picture says of its network.
+struct NetworkFacts {
     name: String,
+    /// Hash of its file.
+    hash: String,
     training: String,
 }
 
@@ -58,30 +61,40 @@ pub fn check(request: &FinishRequest) -> Result<()> {
 /// bandwidth levels of the render, if known.
 ///
 /// # Errors
-/// A library that the user asks for by name is missing, or the network combines another number of levels.
+/// A library that the user asks for by name is missing, or the network combines another number of levels, or is one of
+/// the finish and there is no denoiser.
 pub fn open(request: &FinishRequest, levels: Option<usize>) -> Result<OpenFinish> {
-    let opened = request.model.as_deref().map(|name| open_network(name, levels)).transpose()?;
-    let (model, combiner) = opened.unzip();
-    let (finish, missing) = Finish::open(request.denoiser, combiner)?;
+    let open = |name: &String| open_network(name, request.denoiser, levels);
+    let (model, network) = request.model.as_ref().map(open).transpose()?.unzip();
+    let (finish, missing) = Finish::open(request.denoiser, network)?;
     Ok(OpenFinish { finish, model, missing })
 }
 
-fn open_network(name: &str, levels: Option<usize>) -> Result<(Network, Combiner)> {
+fn open_network(name: &str, denoiser: DenoiserChoice, levels: Option<usize>) -> Result<(NetworkFacts, Network)> {
     let model = Model::open(name)?;
-    let combiner = Combiner::new(&model, &find_runtime()?)?;
-    let facts = combiner.metadata();
+    let network = Network::load(&model, &find_runtime()?, rayon::current_num_threads())?;
+    let facts = network.metadata();
+    let of_finish = facts.form == OutputForm::Picture;
+    if of_finish && denoiser == DenoiserChoice::None {
+        let cause = format!("the network {name} reads the denoised picture, which --denoise none does not make");
+        return Err(Error::usage(cause).hint("leave one of the two out"));
+    }
     if let Some(levels) = levels.filter(|levels| *levels != facts.levels) {
-        let cause = format!("the network {name} combines {} levels, not {levels}", facts.levels);
+        let cause = if of_finish {
+            format!("the network {name} reads pictures of one level, not of {levels}")
+        } else {
+            format!("the network {name} combines {} levels, not {levels}", facts.levels)
+        };
         let error = Error::usage(cause);
         return Err(error.hint(format!("leave --model out, or render with --levels {}", facts.levels)));
     }
-    let network = Network { name: name.into(), training: facts.training.clone() };
-    Ok((network, combiner))
+    let facts = NetworkFacts { name: name.into(), hash: model.hash(), training: facts.training.clone() };
+    Ok((facts, network))
 }
 
 fn find_runtime() -> Result<Runtime> {
     Runtime::find().map_err(|mut error| {
-        let advice = "or leave --model out: levels are not combined by the network then";
+        let advice = "or leave --model out, and the network with it";
         error.hint = Some(error.hint.map_or(advice.into(), |hint| format!("{hint}; {advice}")));
         error
     })
@@ -112,6 +125,7 @@ impl OpenFinish {
             Ok(clock.seconds() * pixels as f64 / small.pixels() as f64)
         };
         let guides = time(&|finish| finish.warm_up_guides(small))?;
+        let network = time(&|finish| finish.warm_up_network(small))?;
         let mut time = |quality| time(&|finish| finish.warm_up(small, quality));
         let fast = time(Quality::Fast)?;
         let mut picture = (Quality::Fast, fast);
@@ -126,7 +140,8 @@ impl OpenFinish {
         }
         self.finish.quality = picture.0;
         // The guides, the picture, the half of its iterations that gives its error, and its parts.
-        Ok((guides + 2.0 * picture.1 + fast * parts as f64).min(MAX_FINISH_SHARE * limit))
+        let seconds = guides + 2.0 * (picture.1 + network) + fast * parts as f64;
+        Ok(seconds.min(MAX_FINISH_SHARE * limit))
     }
 
     /// Finishes a preview: at the lowest quality, without a bound, without its error and its parts.
@@ -167,6 +182,7 @@ impl OpenFinish {
             "denoiser": self.finish.denoiser(),
             "quality": quality,
             "model": self.model.as_ref().map(|network| &network.name),
+            "model_hash": self.model.as_ref().map(|network| &network.hash),
             "levels": finished.combined,
             "training": self.model.as_ref().map(|network| &network.training),
             "clamped": {"below_zero": finished.clamped.below_zero, "too_bright": finished.clamped.too_bright},

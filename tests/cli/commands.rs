@@ -39,6 +39,55 @@ fn finishing_later_gives_the_picture_of_finishing_at_once() {
     assert_eq!(outcome.code, Some(1), "{}", outcome.stderr);
 }
 
+/// A network of the finish reads pictures of one level, which it chooses. The header and `info` name it, and a stored
+/// picture is finished like a new one.
+#[test]
+fn a_network_of_the_finish_improves_pictures_of_one_level() {
+    let folder = Folder::new();
+    let network = include_bytes!("../../src/finish/testdata/finish.onnx");
+    std::fs::write(folder.path("a.onnx"), network).expect("it can be written");
+    for method in ["sppm", "vcm", "path", "bdpt"] {
+        let photons = if method == "sppm" { "--photons 2000" } else { "" };
+        let render = format!("render scene.glb --width 64 --height 48 --iterations 4 --method {method} {photons}");
+        let with = format!("{render} --layers all,Quarter --reproducible --model a.onnx");
+        for (name, threads) in [("at_once.exr", 1), ("threads.exr", 3)] {
+            let outcome = folder.run(&format!("{with} -o {name} --threads {threads} --overwrite"));
+            assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+        }
+        let read = |name: &str| std::fs::read(folder.path(name)).expect("it is there");
+        assert!(read("at_once.exr") == read("threads.exr"), "{method}");
+        let (at_once, header) = folder.read("at_once.exr");
+        let finish = &header["combined"];
+        assert_eq!((&finish["model"], &finish["levels"]), (&"a.onnx".into(), &serde_json::Value::Null));
+        assert_eq!(finish["model_hash"], blake3::hash(network).to_hex().as_str());
+        assert!(at_once.get("Level2").is_none() && at_once.get("CombinedDirect").is_some(), "{method}");
+        let levels = if matches!(method, "sppm" | "vcm") { "--levels 1" } else { "" };
+        let raw = folder.run(&format!("{render} {levels} --layers all,Quarter -o raw.exr --no-finish --overwrite"));
+        assert_eq!(raw.code, Some(0), "{}", raw.stderr);
+        for (name, model) in [("later.exr", "--model a.onnx"), ("without.exr", "")] {
+            let outcome = folder.run(&format!("finish raw.exr -o {name} --overwrite {model}"));
+            assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+        }
+        let [later, without] = ["later.exr", "without.exr"].map(|name| values(&folder.read(name).0, ""));
+        assert!(values(&at_once, "") == later && later != without, "{method}");
+    }
+    let info = folder.run("info later.exr").stdout;
+    assert!(info.contains("finished with the network a.onnx (BLAKE3 "), "{info}");
+    for (options, error) in [
+        ("--levels 5", "reads pictures of one level, not of 5\nhint: leave --model out, or render with --levels 1\n"),
+        ("--denoise none", "reads the denoised picture, which --denoise none does not make\nhint: leave one of"),
+    ] {
+        let refused = folder.run(&format!("render scene.glb -o no.exr --method sppm --model a.onnx {options}"));
+        assert_eq!(refused.code, Some(2), "{}", refused.stderr);
+        assert!(refused.stderr.starts_with(&format!("command line: the network a.onnx {error}")), "{}", refused.stderr);
+    }
+    folder.render("-o levels.exr --iterations 2 --no-finish --method sppm");
+    let refused = folder.run("finish levels.exr -o no.exr --model a.onnx");
+    assert_eq!(refused.code, Some(1), "{}", refused.stderr);
+    let error = "levels.exr: the image has 5 levels, the network takes 1\nhint: render with --levels 1";
+    assert!(refused.stderr.starts_with(error), "{}", refused.stderr);
+}
+
 /// A picture with Blender's layer names can be finished: combined, albedo, normal, and either two halves or the
 /// equivalent variance, which give the same picture.
 #[test]

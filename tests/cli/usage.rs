@@ -436,7 +436,7 @@ fn missing_libraries_are_named_before_rendering() {
     let lines: Vec<&str> = outcome.stderr.lines().collect();
     assert_eq!(lines[0], "CAUSTIQUE_ONNXRUNTIME=/no/such/library.so: no such file");
     assert!(lines[1].starts_with("hint: on Debian 13: apt-get install libonnxruntime1.21;"), "{}", lines[1]);
-    assert!(lines[1].ends_with("; or leave --model out: levels are not combined by the network then"), "{}", lines[1]);
+    assert!(lines[1].ends_with("; or leave --model out, and the network with it"), "{}", lines[1]);
     assert_eq!((lines.len(), folder.files().len()), (2, 0));
     assert_eq!(missing("CAUSTIQUE_ONNXRUNTIME", &format!("{render} --progress none")).code, Some(0));
 

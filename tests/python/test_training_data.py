@@ -9,7 +9,7 @@ import numpy as np
 
 import support  # noqa: F401 (adds scripts to the path)
 
-from lab.train import bound, data, families, finish_data, finish_views, normalise, views
+from lab.train import bound, data, families, finish_data, finish_fixture, finish_views, normalise, views
 
 
 def arrays(rng, side=16):
@@ -136,6 +136,11 @@ class FinishData(unittest.TestCase):
         self.assertGreater(shared, 0.45)
         noise[2] = 0
         self.assertTrue((bound.correlation(noise) == np.float32(1 / 9)).all())
+
+    def test_the_planes_that_a_test_in_rust_reads_are_those_of_training(self):
+        picture, wanted = finish_fixture.stored()
+        found, _ = finish_fixture.planes(picture)
+        np.testing.assert_allclose(found, wanted, rtol=1e-3, atol=1e-6)
 
     def test_stacks_of_a_picture_give_samples_of_the_network(self):
         rng = np.random.default_rng(10)

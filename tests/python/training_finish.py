@@ -11,7 +11,7 @@ import torch
 
 import support  # noqa: F401 (adds scripts to the path)
 
-from lab.train import data, export_network, finish_data, finish_model, finish_train, finish_views, train
+from lab.train import data, export_network, finish_data, finish_fixture, finish_model, finish_train, finish_views, train
 
 PLANES = sum(finish_views.PLANES.values())
 
@@ -87,6 +87,17 @@ class Network(unittest.TestCase):
         with torch.no_grad():
             wanted = net(x).numpy()
         self.assertLess(np.abs(got - wanted).max() / np.abs(wanted).max(), 1e-5)
+
+
+class Fixture(unittest.TestCase):
+    def test_the_files_that_rust_tests_read_are_those_of_this_code(self):
+        for name, content in finish_fixture.content().items():
+            stored = (finish_fixture.FOLDER / name).read_bytes()
+            if name.endswith(".f32"):
+                content, stored = (np.frombuffer(data, "<f4") for data in (content, stored))
+                np.testing.assert_allclose(content, stored, rtol=1e-5, atol=1e-6)
+            else:
+                self.assertEqual(content, stored)
 
 
 class Training(unittest.TestCase):

@@ -36,6 +36,7 @@ fn image(name: &str, channels: u64) -> Vec<u8> {
 fn metadata(kind: &str, others: &[(&str, &str)]) -> Vec<u8> {
     let right = [
         ("normalisation", "1"),
+        ("version", "1"),
         ("kind", kind),
         ("features", "1"),
         ("levels", "2"),
@@ -55,21 +56,29 @@ fn metadata(kind: &str, others: &[(&str, &str)]) -> Vec<u8> {
     metadata
 }
 
-/// A network for two levels: one convolution with zero weights. `kind` is its contract. `others` replaces metadata, or
-/// removes it if the value is empty.
+/// A network for two levels, or of the finish: one convolution with zero weights. `kind` is its contract. `others`
+/// replaces metadata, or removes it if the value is empty.
 pub fn network(kind: &str, others: &[(&str, &str)]) -> Vec<u8> {
-    let input = 4 * 2 + 7;
-    let output = if kind == "features" { 1 + 3 } else { 3 * 3 };
+    with_planes(if kind == "finish" { 24 } else { 4 * 2 + 7 }, kind, others)
+}
+
+/// A [`network`] with this number of input channels.
+pub fn with_planes(input: u64, kind: &str, others: &[(&str, &str)]) -> Vec<u8> {
+    let (output, name) = match kind {
+        "features" => (1 + 3, kind),
+        "finish" => (3, "picture"),
+        _ => (3 * 3, kind),
+    };
     let shape: Vec<u8> = [output, input, 1, 1].into_iter().flat_map(|n| number(1, n)).collect();
     let zeros = vec![0; (4 * output * input) as usize];
     let weights = [shape, number(2, 1), field(8, b"w"), field(9, &zeros)].concat();
-    let node = [field(1, b"input"), field(1, b"w"), field(2, kind.as_bytes()), field(4, b"Conv")].concat();
+    let node = [field(1, b"input"), field(1, b"w"), field(2, name.as_bytes()), field(4, b"Conv")].concat();
     let graph = [
         field(1, &node),
         field(2, b"g"),
         field(5, &weights),
         field(11, &image("input", input)),
-        field(12, &image(kind, output)),
+        field(12, &image(name, output)),
     ];
     let opset = number(2, 13);
     [number(1, 8), field(7, &graph.concat()), field(8, &opset), metadata(kind, others)].concat()

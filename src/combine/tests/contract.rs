@@ -1,6 +1,6 @@
 //! Agreement with the training code (`scripts/lab/train/fixture.py` writes the numbers), and checks of network files.
 
-use super::model::{Metadata, WeightForm};
+use super::model::{Metadata, OutputForm};
 use super::output::{NetworkOutput, Rect};
 use super::*;
 use std::collections::HashMap;
@@ -71,7 +71,7 @@ fn the_shipped_network_has_its_metadata() {
     let metadata = combiner.metadata();
     assert_eq!((metadata.levels, metadata.window), (5, 15));
     assert_eq!(tensor::channels(metadata.levels), 27);
-    assert!(matches!(metadata.form, WeightForm::Features { .. }));
+    assert!(matches!(metadata.form, OutputForm::Features { .. }));
     assert!(Model::compact().bytes.len() < 2 << 20);
 }
 
@@ -95,11 +95,13 @@ fn wrong_metadata_are_refused() {
     assert_eq!(read(&[("kind", "weights"), ("window", "3")]).unwrap().output_channels(), 36);
     let wide = read(&[("dilations", "1,4"), ("identities", "0,1,2,3")]).unwrap();
     assert_eq!((wide.output_channels(), wide.neighbour_radius()), (60, 36));
+    let of_finish = read(&[("kind", "finish"), ("version", "1"), ("normalisation", "")]).unwrap();
+    assert_eq!((of_finish.levels, of_finish.output_channels(), of_finish.neighbour_radius()), (1, 3, 0));
     let refused = read(&[("kind", "weights"), ("identities", "0")]).unwrap_err();
     assert_eq!(refused, "it has dilations or identities, which need the kind features");
     for (change, message) in [
         (("kind", ""), "its metadata lacks caustique.kind"),
-        (("kind", "magic"), "its caustique.kind is \"magic\", neither features nor weights"),
+        (("kind", "magic"), "its caustique.kind is \"magic\", not features, weights or finish"),
         (("levels", "1"), "its caustique.levels is \"1\", not a number from 2 to 16"),
         (("window", "18"), "its window of 18 pixels has no centre"),
         (("features", "9"), "its caustique.features is \"9\", not a number from 1 to 8"),
@@ -124,7 +126,7 @@ fn files_that_are_no_networks_are_errors_with_advice() {
     let compact = Model::compact().bytes;
     for bytes in [&b""[..], b"not a network", &compact[..compact.len() / 2]] {
         std::fs::write(&path, bytes).unwrap();
-        let error = Combiner::new(&Model::from_file(&path).unwrap(), &runtime).err().unwrap();
+        let error = Network::load(&Model::from_file(&path).unwrap(), &runtime, 1).err().unwrap();
         assert_eq!(error.kind, ErrorKind::Model);
         assert!(error.to_string().starts_with(&format!("model {}: ", path.display())), "{error}");
         assert!(error.hint.unwrap().contains("export_network.py"));

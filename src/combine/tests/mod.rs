@@ -53,7 +53,8 @@ impl Random {
 
 fn combiner() -> Combiner {
     // A machine without ONNX Runtime must fail these tests, not skip them: scripts/setup.sh installs it.
-    Combiner::new(&Model::compact(), &Runtime::find().unwrap()).unwrap()
+    let runtime = Runtime::find().unwrap();
+    Combiner::new(Network::load(&Model::compact(), &runtime, rayon::current_num_threads()).unwrap())
 }
 
 /// Largest absolute difference of two images' channels, divided by `scale`.

@@ -11,6 +11,7 @@ use super::{
 };
 #[cfg(feature = "cli")]
 use crate::argument::{Elsewhere, Ranged};
+use crate::combine::Purpose;
 use crate::error::{Error, Result};
 use crate::estimator::rule::chi_squared::ChiSquaredSettings;
 use crate::path_class::Switches;
@@ -64,12 +65,13 @@ pub struct SettingsRequest {
     )]
     pub photon_memory: Option<u32>,
     /// Bandwidth levels of ppm, sppm, appm, cppm and vcm, 1 to 5: each is 1/sqrt(2) of the next larger. Images range
-    /// from sharp and noisy to smooth and blurred. The network 'compact' of --model combines 5 [default: 5]
+    /// from sharp and noisy to smooth and blurred. The network 'compact' of --model combines 5, networks of the finish
+    /// read 1 [default: 5, with a network of the finish 1]
     #[cfg_attr(feature = "cli", arg(long, value_name = "M", whole = 1..=MAX_LEVELS, help_heading = "Expert"))]
     pub levels: Option<usize>,
     /// Camera paths per pixel and iteration with several levels: one for all levels, or two, of which one is for level
-    /// 1 alone, as the network of --model was trained with. Two take about 1.7 times as long [default: 1, with --model
-    /// 2]
+    /// 1 alone, as the network 'compact' of --model was trained with. Two take about 1.7 times as long [default: 1,
+    /// with that network 2]
     #[cfg_attr(feature = "cli", arg(long, value_name = "1|2", whole = 1_u32..=2, help_heading = "Expert"))]
     pub eye_paths: Option<u32>,
     /// Largest bandwidth at the start: 'knn' is the distance to the k-th nearest photon, 'footprint' is three pixels, a
@@ -167,10 +169,10 @@ pub struct SettingsRequest {
     #[serde(skip)]
     #[cfg_attr(feature = "cli", arg(skip))]
     pub switches: Switches,
-    /// Whether a network combines the levels, so that their number is the one that it was trained with.
+    /// Purpose of the network of the finish, which was trained with a number of levels; `None` without a network.
     #[serde(skip)]
     #[cfg_attr(feature = "cli", arg(skip))]
-    pub network: bool,
+    pub network: Option<Purpose>,
     /// [`Settings::threads`].
     #[serde(skip)]
     #[cfg_attr(feature = "cli", arg(skip))]
@@ -217,7 +219,7 @@ impl SettingsRequest {
         };
         let indirect = self.indirect.is_none_or(|indirect| !method.gathers() || candidate.indirect == indirect);
         let required = self.resolve().ok()?.levels;
-        let levels = |settings: &Settings| !self.network || settings.levels == required;
+        let levels = |settings: &Settings| self.network.is_none() || settings.levels == required;
         let settings = self.settings_of(candidate, Some(method)).ok();
         // Without some techniques another method remains, and the options must have an effect with it, too.
         let fits = |settings: &Settings| {
@@ -321,9 +323,10 @@ impl SettingsRequest {
 
     /// The number of bandwidth levels, and whether level 1 has a camera path of its own.
     fn levels(&self, method: Method) -> Levels {
-        let count = self.levels.unwrap_or(if method.has_levels() { MAX_LEVELS } else { 1 });
+        let has_levels = method.has_levels() && self.network != Some(Purpose::Finish);
+        let count = self.levels.unwrap_or(if has_levels { MAX_LEVELS } else { 1 });
         // Equation (6) of the 2021 paper combines an independent level with correlated ones.
-        let two_paths = self.eye_paths.map_or(self.network, |paths| paths == 2);
+        let two_paths = self.eye_paths.map_or(self.network == Some(Purpose::Levels), |paths| paths == 2);
         if two_paths { Levels::decorrelated(count) } else { Levels::new(count) }
     }
 }

@@ -42,6 +42,7 @@ fn main() -> Outcome {
     states(&seeds, program)?;
     seeds.add("model", "features", &onnx::network("features", &[]))?;
     seeds.add("model", "weights", &onnx::network("weights", &[]))?;
+    seeds.add("model", "finish", &onnx::network("finish", &[]))?;
     seeds.add("usd_options", "some", br#"["--width=640", "--output=a.exr"]"#)?;
     seeds.add("usd_fault", "fault", b"noise\n{\"prim\": \"/a\", \"fault\": \"it is odd\", \"hint\": null}\n")?;
     Ok(())
