@@ -142,7 +142,8 @@ impl FinishNetwork {
     }
 
     /// The network's picture of an estimate, whose denoised picture is `denoised`. `has_parts`: whether the additive
-    /// parts in `planes` are those of this estimate. Where the output is no possible picture, it is the denoised one.
+    /// parts in `planes` are those of this estimate. The denoised picture stays where the output is no possible picture,
+    /// and where it is itself too bright to be read.
     ///
     /// # Errors
     /// [`ErrorKind::Model`]: the network fails.
@@ -181,10 +182,13 @@ impl FinishNetwork {
             let Rect { x0, y0, x1, y1 } = tile.core;
             let colour = |x: usize, y: usize| {
                 let own: [f32; 3] = from_fn(|c| output.row(c, y)[x - output.rect.x0]);
-                let is_possible = own.iter().all(|value| (0.0..=brightest).contains(value));
-                let rgb = own.map(|value| value / scales.exposure);
-                let kept = is_possible && rgb.iter().all(|value| value.is_finite());
-                if kept { rgb } else { denoised[y * denoised.size().width + x] }
+                let without = denoised[y * denoised.size().width + x];
+                let is_possible = |c: usize| {
+                    // The input clamps what is brighter.
+                    let is_read = without[c] * scales.exposure < LARGEST;
+                    is_read && (0.0..=brightest).contains(&own[c]) && (own[c] / scales.exposure).is_finite()
+                };
+                if (0..3).all(is_possible) { own.map(|value| value / scales.exposure) } else { without }
             };
             (y0..y1).flat_map(|y| (x0..x1).map(move |x| (x, y))).map(|(x, y)| colour(x, y)).collect::<Vec<_>>()
         };

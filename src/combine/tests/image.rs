@@ -33,8 +33,7 @@ fn the_receptive_radius_of_the_network_is_its_halo() {
     let (stack, mut combiner) = (Random(6).stack(212, 152, 5), combiner());
     let halo = combiner.metadata().halo;
     let normalisation = Normalisation::of(&stack);
-    let mut output =
-        |rect: Rect| combiner.network.run(&tensor::fill(&stack, &normalisation, rect), rect).unwrap();
+    let mut output = |rect: Rect| combiner.network.run(&tensor::fill(&stack, &normalisation, rect), rect).unwrap();
     let whole = output(Rect { x0: 0, y0: 0, x1: 212, y1: 152 });
     let tile = output(Rect { x0: 100, y0: 40, x1: 200, y1: 140 });
     let difference = |x: usize, y: usize| {
