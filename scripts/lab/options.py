@@ -51,7 +51,11 @@ KNOWN = {
     "scenes": Argument(names, "names below scenes/, such as pool,second/still,twin/pool, or paths that end in .glb"),
     "seconds": Argument(budget, "seconds or core-seconds of a render"),
     "seeds": Argument(int, "number of renders of each kind, with different seeds"),
-    "set": Argument(str, "first, second, all, or twins: scenes without features that other renderers' drivers lack"),
+    "set": Argument(
+        str,
+        "first, second, all, twins: scenes without features that other renderers' drivers lack, "
+        "or random: a scene of each family of the training data",
+    ),
     "shots": Argument(names, "animated shots: pool, turntable, interior, gems"),
     "target": Argument(float, "relative error that stops a render"),
     "threads": Argument(int, "threads of a render"),

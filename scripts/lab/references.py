@@ -13,6 +13,8 @@ from .cache import CACHE, create, frame_suffix, load, outside, program, run_time
 from .commands import command, read
 from .options import options
 from .record import ROOT
+from .train import families
+from .train.data import build_scene
 
 ARGUMENTS = {"set": "first", "scenes": None, "width": 320, "threads": 2, "reference_seconds": 240.0}
 # Least share of the reference's core-seconds for a stored half, because times of iterations vary.
@@ -23,7 +25,9 @@ FRAME_SEEDS = 10_000
 METHODS = {"blocks": ["bdpt"], "interior": ["bdpt"], "stadium": ["vcm", "--guide", "on"]}
 # Factors of the core-seconds. A bulb seen through fluted glass has one bright sample in hundreds with every method.
 TIME_FACTORS = {"lamp": 2}
-SETS = {"first": ["scenes"], "second": ["scenes/second"], "all": ["scenes", "scenes/second"], "twins": []}
+SETS = {"first": ["scenes"], "second": ["scenes/second"], "all": ["scenes", "scenes/second"], "twins": [], "random": []}
+# The random scene of each family in the set "random", far from those of training.
+RANDOM_INDEX = 1000
 
 
 def scenes():
@@ -37,8 +41,19 @@ def scenes():
         if missing:
             raise SystemExit(f"{missing[0]} does not exist: --scenes names files below scenes, without .glb, or paths")
         return found
+    if options.set == "random":
+        return [random_scene(family) for family in families.names()]
     found = [file for folder in SETS[options.set] or SETS["all"] for file in sorted((ROOT / folder).glob("*.glb"))]
     return found if options.set != "twins" else [file for file in map(twins.twin, found) if file]
+
+
+def random_scene(family):
+    """The file of a random scene of a family of the training data, which Blender writes once."""
+    file = CACHE / "random-scenes" / f"{family}.glb"
+    if not file.exists():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        build_scene(family, RANDOM_INDEX, 0, file)
+    return file
 
 
 def path(text):
@@ -66,7 +81,7 @@ def method(scene):
     known = name(scene).removeprefix("twin/").removeprefix("shot/")
     if known in METHODS:
         return METHODS[known]
-    effects = {effect["name"]: effect["simulated"] for effect in read("plan", str(scene))["effects"]}
+    effects = {effect["name"]: effect["simulated"] for effect in read("plan", str(scene), "--method", "vcm")["effects"]}
     return ["vcm"] if effects.get("sds", True) else ["bdpt"]
 
 

@@ -87,6 +87,17 @@ def views(folder, count, view=View):
     return found
 
 
+def build_scene(family, index, attempt, scene):
+    """Writes a random scene of a family."""
+    path = os.pathsep.join(map(str, (ROOT / "scripts", ROOT / "scripts" / "blender")))
+    draft = scene.with_name("part.glb")
+    line = [BLENDER, "-m", "lab.train.families", family, index, attempt, draft]
+    done = subprocess.run(list(map(str, line)), capture_output=True, text=True, env=os.environ | {"PYTHONPATH": path})
+    if done.returncode or not draft.exists():
+        raise Failed((done.stderr or done.stdout).strip()[-600:])
+    draft.rename(scene)
+
+
 def independent_file(method, seed):
     """The name of the file with the pictures by bdpt that the deep combiner reads beside a noisy stack."""
     return f"{method}-bdpt{seed}.npz"
@@ -127,7 +138,7 @@ class Maker:
         note = load(view.folder / "view.json") or self.scout(view, work)
         scene = view.scene or work / "scene.glb"
         if not scene.exists():
-            self.build(view, note["attempt"], scene)
+            build_scene(view.family, view.index, note["attempt"], scene)
         for method in view.methods:
             window = note["windows"][method]
             if not (view.folder / f"{method}-target.npz").exists():
@@ -162,25 +173,13 @@ class Maker:
         self.spent = 0.0
         save(view.folder / "view.json", note)
 
-    def build(self, view, attempt, scene):
-        """Writes the random scene of a view."""
-        path = os.pathsep.join(map(str, (ROOT / "scripts", ROOT / "scripts" / "blender")))
-        draft = scene.with_name("part.glb")
-        line = [BLENDER, "-m", "lab.train.families", view.family, view.index, attempt, draft]
-        done = subprocess.run(
-            list(map(str, line)), capture_output=True, text=True, env=os.environ | {"PYTHONPATH": path}
-        )
-        if done.returncode or not draft.exists():
-            raise Failed((done.stderr or done.stdout).strip()[-600:])
-        draft.rename(scene)
-
     def scout(self, view, work):
         """Chooses the scene and the windows of a view by a small quick picture; writes and returns view.json."""
         for attempt in range(1 if view.scene else ATTEMPTS):
             scene = view.scene or work / "scene.glb"
             if not view.scene:
                 scene.unlink(missing_ok=True)
-                self.build(view, attempt, scene)
+                build_scene(view.family, view.index, attempt, scene)
             settings = {"method": "sppm", "levels": LEVELS, "width": SCOUT_WIDTH, "iterations": 6, "no_finish": True}
             picture = self.render(scene, work / "scout.exr", **settings, no_checkpoint=True)
             levels = np.stack([rgb(picture, f"Level{k + 1}") for k in range(LEVELS)])
