@@ -65,7 +65,7 @@ fn a_network_of_the_finish_improves_pictures_of_one_level() {
         let raw = folder.run(&format!("{render} {levels} --layers all,Quarter -o raw.exr --no-finish --overwrite"));
         assert_eq!(raw.code, Some(0), "{}", raw.stderr);
         for (name, model) in [("later.exr", "--model a.onnx"), ("without.exr", "")] {
-            let outcome = folder.run(&format!("finish raw.exr -o {name} --overwrite {model}"));
+            let outcome = folder.run(&format!("finish raw.exr -o {name} {model}"));
             assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
         }
         let [later, without] = ["later.exr", "without.exr"].map(|name| values(&folder.read(name).0, ""));
