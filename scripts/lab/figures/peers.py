@@ -72,8 +72,9 @@ def compare(scene, names, budget):
     finished.others(peers, names, budget, reference, halves, cell)
     ours = cell["ours"]["auto"]["delivered"]
     theirs = {peer: made["oidn"] for peer, made in cell["peers"].items() if "oidn" in made}
+    # Errors that the reference's noise hides have no ratio.
     ratios = {
-        peer: {key: max(ours[key], 1e-9) / max(figures[key], 1e-9) for key in COMPARED if key in ours}
+        peer: {key: ours[key] / figures[key] for key in COMPARED if min(ours.get(key, 0), figures.get(key, 0)) > 0}
         for peer, figures in theirs.items()
     }
     shown, titles = pictures(scene, peers, cell, reference)
@@ -88,7 +89,7 @@ def compare(scene, names, budget):
         "figures": {
             peer: [float(f"{of[key]:.4g}") if key in of else None for key in COMPARED] for peer, of in figures.items()
         },
-        "ratios": {peer: {key: round(value, 3) for key, value in of.items()} for peer, of in ratios.items()},
+        "ratios": {peer: {key: float(f"{value:.3g}") for key, value in of.items()} for peer, of in ratios.items()},
         "core_seconds": {peer: round(spent, 1) for peer, spent in cell["core_seconds"].items()},
         "notes": cell["notes"],
     }
