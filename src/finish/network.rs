@@ -33,7 +33,7 @@ pub fn bytes(pixels: u64) -> u64 {
     BYTES_PER_PIXEL * pixels + TILE_BYTES
 }
 
-/// What the network reads of a picture besides its estimate.
+/// Layers of a picture that the network reads, apart from its estimate.
 pub struct Planes {
     /// Reflectance and normal at the first rough hit, with their noise.
     guides: [Picture; 2],

@@ -39,7 +39,7 @@ pub struct OpenFinish {
     pub missing: Option<Error>,
 }
 
-/// What the header of a picture says of its network.
+/// Facts about a network for the header of a picture.
 struct NetworkFacts {
     name: String,
     /// Hash of its file.

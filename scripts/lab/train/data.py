@@ -90,7 +90,7 @@ def views(folder, count, view=View):
 def build_scene(family, index, attempt, scene):
     """Writes a random scene of a family."""
     path = os.pathsep.join(map(str, (ROOT / "scripts", ROOT / "scripts" / "blender")))
-    draft = scene.with_name("part.glb")
+    draft = scene.with_name(f"{scene.stem}.part.glb")
     line = [BLENDER, "-m", "lab.train.families", family, index, attempt, draft]
     done = subprocess.run(list(map(str, line)), capture_output=True, text=True, env=os.environ | {"PYTHONPATH": path})
     if done.returncode or not draft.exists():
