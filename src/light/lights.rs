@@ -11,7 +11,7 @@ use super::group::{Group, Groups};
 use super::kind::{
     Emitter, EnvironmentLight, Light, LightRay, Owner, SceneParts, Selected, TriangleLight, VolumeLight,
 };
-use super::learnt_sky::LearntSky;
+use super::learnt::{LearntLight, LearntSky, LightBins};
 use super::links::{LightLinks, LinkedObjects, Linking};
 use super::receiver::Receiver;
 use super::sampler::LightSampler;
@@ -124,11 +124,19 @@ impl Lights {
         Lights { groups, ..self }
     }
 
-    /// Replaces what is known about where light of the environment arrives.
+    /// Replaces what is known about where light arrives. What was learnt about other lights than these is left out.
     #[must_use]
-    pub fn with_learnt_sky(self, learnt: Arc<LearntSky>) -> Lights {
-        let is_same = self.sky.environment.as_ref().is_some_and(|environment| learnt.is_of(environment));
-        Lights { sky: Sky { learnt: is_same.then_some(learnt), ..self.sky }, ..self }
+    pub fn with_learnt(self, learnt: &LearntLight) -> Lights {
+        let is_same =
+            |sky: &Arc<LearntSky>| self.sky.environment.as_ref().is_some_and(|environment| sky.is_of(environment));
+        let sky = learnt.sky.clone().filter(is_same);
+        let choice = self.choice.map(|choice| Arc::new(choice.with_learnt(learnt.lights.as_ref())));
+        Lights { sky: Sky { learnt: sky, ..self.sky }, choice, ..self }
+    }
+
+    /// The bins of lights for which probabilities can be learnt; `None` if there is nothing to choose.
+    pub fn bins(&self) -> Option<LightBins> {
+        LightBins::new(self.choice.as_ref()?)
     }
 
     /// Limits the light and the shadows of lights to some objects.

@@ -11,7 +11,7 @@ mod environment;
 mod group;
 pub mod guide;
 mod kind;
-mod learnt_sky;
+mod learnt;
 mod lights;
 mod links;
 mod picture;
@@ -37,7 +37,7 @@ pub use kind::{
     Emitter, EnvironmentLight, Light, LightPlacement, Owner, PointLight, PunctualKind, ShapedLight, SpotLight,
     SunLight, TriangleLight, VolumeLight,
 };
-pub use learnt_sky::{LearntSky, SkySamples};
+pub use learnt::{LearntLight, LearntLights, LearntSky, LightBins, LightSamples, LitSample, SkySectors};
 pub use lights::Lights;
 pub use links::{LightLinks, LinkedObjects, Linking, MAX_LINKINGS};
 pub use picture::Picture;

@@ -251,12 +251,50 @@ impl LightTree {
         self.siblings[0].importance(at).values[0]
     }
 
+    /// Divides all lights into at most `most` clusters. Where the intensity times the radius is largest, it divides first.
+    pub fn clusters(&self, most: usize) -> Vec<u32> {
+        let mut clusters = vec![0];
+        let spread = |&cluster: &u32| {
+            let (siblings, lane) = self.place(cluster);
+            let [intensity, radius2] = [siblings.intensity, siblings.radius2].map(|of| of.to_array()[lane]);
+            if siblings.children[lane] == 0 { 0.0 } else { intensity * radius2.sqrt() }
+        };
+        while let Some(widest) =
+            (0..clusters.len()).max_by(|&a, &b| spread(&clusters[a]).total_cmp(&spread(&clusters[b])))
+            && spread(&clusters[widest]) > 0.0
+        {
+            let (siblings, lane) = self.place(clusters[widest]);
+            let children = siblings.children[lane];
+            let parts = (0..WIDTH).filter(|&part| self.siblings[children as usize].count[part] > 0);
+            let parts: Vec<u32> = parts.map(|part| children * WIDTH as u32 + part as u32).collect();
+            if clusters.len() + parts.len() > most + 1 {
+                break;
+            }
+            clusters.swap_remove(widest);
+            clusters.extend(parts);
+        }
+        clusters
+    }
+
+    /// The indices of the emitters of a cluster.
+    pub fn emitters(&self, cluster: u32) -> &[u32] {
+        let (siblings, lane) = self.place(cluster);
+        let first = siblings.first[lane] as usize;
+        &self.order[first..first + siblings.count[lane] as usize]
+    }
+
     /// Selects an emitter for a receiver by the uniform number `u`. Returns its index and its probability; `None` if no
     /// light of the tree can reach the receiver.
     #[inline]
-    pub fn sample(&self, at: &Receiver, mut u: f64) -> Option<(usize, f32)> {
-        let (mut siblings, mut lane, mut pdf) = (&self.siblings[0], 0, 1.0);
-        let mut compact = siblings.importance(at).is_compact(0);
+    pub fn sample(&self, at: &Receiver, u: f64) -> Option<(usize, f32)> {
+        self.sample_in(0, at, u)
+    }
+
+    /// Selects an emitter of a cluster as [`LightTree::sample`] does.
+    #[inline]
+    pub fn sample_in(&self, cluster: u32, at: &Receiver, mut u: f64) -> Option<(usize, f32)> {
+        let ((mut siblings, mut lane), mut pdf) = (self.place(cluster), 1.0);
+        let mut compact = siblings.importance(at).is_compact(lane);
         while siblings.children[lane] != 0 && !compact {
             siblings = &self.siblings[siblings.children[lane] as usize];
             let importance = siblings.importance(at);
@@ -276,16 +314,17 @@ impl LightTree {
         (pdf > 0.0).then_some((emitter as usize, pdf))
     }
 
-    /// Probability with which [`LightTree::sample`] selects the emitter of this index at a receiver.
+    /// Probabilities with which [`LightTree::sample_in`] selects the emitter of this index at a receiver, in the cluster
+    /// `above` that contains it, and in the whole tree.
     #[inline]
-    pub fn pdf(&self, at: &Receiver, emitter: usize) -> f32 {
+    pub fn pdfs(&self, above: u32, at: &Receiver, emitter: usize) -> [f32; 2] {
         let mut cluster = self.leaves[emitter];
         if cluster == NONE {
-            return 0.0;
+            return [0.0; 2];
         }
         let (leaf, lane) = self.place(cluster);
         let own = leaf.first[lane] as usize;
-        let mut pdf = 1.0;
+        let (mut within, mut pdf) = (0.0, 1.0);
         loop {
             let (siblings, lane) = self.place(cluster);
             let importance = siblings.importance(at);
@@ -293,8 +332,11 @@ impl LightTree {
             if importance.is_compact(lane) && siblings.children[lane] != 0 {
                 pdf = self.intensity_share(own, siblings, lane);
             }
+            if cluster == above {
+                within = pdf;
+            }
             if cluster == 0 {
-                return pdf;
+                return [within, pdf];
             }
             pdf *= importance.probability(lane);
             cluster = siblings.parent;
@@ -373,6 +415,11 @@ mod tests {
         (0..n).map(light).collect()
     }
 
+    fn pdf(tree: &LightTree, at: &Receiver, emitter: usize) -> f32 {
+        let [_, pdf] = tree.pdfs(0, at, emitter);
+        pdf
+    }
+
     /// Whether some point of the light shines on `p`.
     fn shines(emitter: &Emitter, p: Vec3) -> bool {
         match emitter {
@@ -396,7 +443,7 @@ mod tests {
             let p = draws.two(Purpose::Pixel).extend(draws.one(Purpose::Lobe)) * 12.0 - 1.0;
             let n = warp::sphere_uniform(draws.two(Purpose::Lens));
             let at = Receiver { n: if i % 3 == 0 { Vec3::ZERO } else { n }, ..Receiver::anywhere(p) };
-            let sum: f32 = (0..emitters.len()).map(|k| tree.pdf(&at, k)).sum();
+            let sum: f32 = (0..emitters.len()).map(|k| pdf(&tree, &at, k)).sum();
             let n = 4096;
             let (mut count, mut none) = (vec![0u32; emitters.len()], 0);
             for k in 0..n {
@@ -405,14 +452,40 @@ mod tests {
                     none += 1;
                     continue;
                 };
-                assert!((pdf - tree.pdf(&at, index)).abs() <= 1e-4 * pdf, "{pdf} {}", tree.pdf(&at, index));
+                assert!((pdf - pdf(&tree, &at, index)).abs() <= 1e-4 * pdf, "{pdf} {}", pdf(&tree, &at, index));
                 count[index] += 1;
             }
             assert!((sum + none as f32 / n as f32 - 1.0).abs() < 2e-3, "{sum} and {none} at {p}");
             for (index, &count) in count.iter().enumerate() {
                 // `u` is in equal steps, so each interval of selection gains or loses less than one at either end.
-                let expected = tree.pdf(&at, index) * n as f32;
+                let expected = pdf(&tree, &at, index) * n as f32;
                 assert!((count as f32 - expected).abs() <= 2.0, "{count} {expected}");
+            }
+        }
+    }
+
+    /// Clusters divide the lights, and selecting within one has the stated probability.
+    #[test]
+    fn clusters_divide_the_lights() {
+        let emitters = lights(61);
+        let tree = LightTree::new(&emitters).unwrap();
+        let clusters = tree.clusters(20);
+        let mut all: Vec<u32> = clusters.iter().flat_map(|&cluster| tree.emitters(cluster)).copied().collect();
+        all.sort_unstable();
+        assert!(all == Vec::from_iter(0..61) && (15..=20).contains(&clusters.len()), "{clusters:?} {all:?}");
+        for i in 0..20 {
+            let draws = Stream::new(8, 0, Domain::Test, i).vertex(0);
+            let at = Receiver::anywhere(draws.two(Purpose::Pixel).extend(draws.one(Purpose::Lobe)) * 12.0 - 1.0);
+            for &cluster in &clusters {
+                let n = 64;
+                for k in 0..n {
+                    let Some((index, own)) = tree.sample_in(cluster, &at, (f64::from(k) + 0.5) / f64::from(n)) else {
+                        continue;
+                    };
+                    let [within, whole] = tree.pdfs(cluster, &at, index);
+                    assert!(tree.emitters(cluster).contains(&(index as u32)) && (within / own - 1.0).abs() < 1e-4);
+                    assert!(whole <= within * 1.0001, "{whole} {within}");
+                }
             }
         }
     }
@@ -429,7 +502,7 @@ mod tests {
             let p = draws.two(Purpose::Pixel).extend(draws.one(Purpose::Lobe)) * 14.0 - 2.0;
             let at = Receiver::anywhere(p);
             for (index, emitter) in emitters.iter().enumerate() {
-                let pdf = tree.pdf(&at, index);
+                let pdf = pdf(&tree, &at, index);
                 if shines(emitter, p) {
                     shining += 1;
                     assert!(pdf > 0.0, "{emitter:?} from {p}");
@@ -441,7 +514,7 @@ mod tests {
         assert!(shining > 30_000 && never > 3_000, "{shining} {never}");
         let point = |x: f32| Emitter::from(PointLight { p: Vec3::new(x, 0.0, 0.0), intensity: Rgb::ONE });
         let tree = LightTree::new(&[point(0.0), point(10.0)]).unwrap();
-        assert!((tree.pdf(&Receiver::anywhere(Vec3::X), 0) - 81.0 / 82.0).abs() < 1e-5);
+        assert!((pdf(&tree, &Receiver::anywhere(Vec3::X), 0) - 81.0 / 82.0).abs() < 1e-5);
     }
 
     #[test]
@@ -449,7 +522,7 @@ mod tests {
         let light = Emitter::from(PointLight { p: Vec3::ONE, intensity: Rgb::ONE });
         let tree = LightTree::new(&vec![light; 1000]).unwrap();
         for p in [Vec3::ONE, Vec3::ZERO] {
-            assert!((tree.pdf(&Receiver::anywhere(p), 17) - 1e-3).abs() < 1e-6);
+            assert!((pdf(&tree, &Receiver::anywhere(p), 17) - 1e-3).abs() < 1e-6);
         }
         assert!(LightTree::new(&[EnvironmentLight.into()]).is_none());
     }

@@ -1,15 +1,14 @@
-//! Learning where light of the environment arrives, before a method is chosen, so that pilots and render know the same.
+//! Learning where light arrives, before a method is chosen, so that pilots and render know the same.
 
-use crate::light::LearntSky;
-use crate::render::{Settings, TimeSpent, learn_sky};
+use crate::light::LearntLight;
+use crate::render::{Settings, TimeSpent, learn_light};
 use crate::scene::{Scene, View};
 use crate::stop::Stop;
-use std::sync::Arc;
 
-/// Where light of the environment arrives in a picture.
+/// Where light arrives in a picture.
 pub struct Learnt {
-    /// The table; `None` if it would not reduce the noise.
-    pub sky: Option<Arc<LearntSky>>,
+    /// What was learnt.
+    pub light: LearntLight,
     /// Time that the learning took.
     pub spent: TimeSpent,
 }
@@ -19,16 +18,16 @@ impl Learnt {
     pub fn new(view: View<'_>, settings: &Settings, stop: &Stop) -> Learnt {
         let settings = Settings { stop: stop.clone(), ..settings.clone() };
         let mut spent = TimeSpent::default();
-        let sky = spent.measure(|| learn_sky(view, &settings));
-        Learnt { sky, spent }
+        let light = spent.measure(|| learn_light(view, &settings));
+        Learnt { light, spent }
     }
 
-    /// A copy of the scene with the table; `None` if there is none.
+    /// A copy of the scene that knows what was learnt; `None` if nothing was.
     pub fn scene(&self, scene: &Scene) -> Option<Scene> {
-        Some(scene.with_learnt_sky(Arc::clone(self.sky.as_ref()?)))
+        (!self.light.is_empty()).then(|| scene.with_learnt(&self.light))
     }
 
-    /// The scene with the table, if there is one.
+    /// The scene with what was learnt.
     pub fn apply(&self, scene: Scene) -> Scene {
         self.scene(&scene).unwrap_or(scene)
     }

@@ -93,7 +93,7 @@ pub fn render_loaded(mut request: Request, loaded: &Loaded, observer: &mut dyn O
     let resumption = Resumption::read(&request, view.scene, &settings)?;
     let learnt = Learnt::new(seen, &settings, &observer.stop());
     let (scene, middle) = (learnt.scene(view.scene), middle.map(|(scene, camera)| (learnt.apply(scene), camera)));
-    let motion = motion.map(|motion| motion.with_learnt_sky(learnt.sky.clone()));
+    let motion = motion.map(|motion| motion.with_learnt(learnt.light.clone()));
     let view = View::new(scene.as_ref().unwrap_or(view.scene), &camera);
     let seen = middle.as_ref().map_or(view, |(scene, camera)| View::new(scene, camera));
     let chosen = match &resumption.saved {

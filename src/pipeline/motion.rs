@@ -4,14 +4,13 @@ use super::load::{SceneRequest, load_stage_moment};
 use super::request::Request;
 use crate::camera::Camera;
 use crate::error::Result;
-use crate::light::LearntSky;
+use crate::light::LearntLight;
 use crate::plan::switch;
 use crate::render::Motion;
 use crate::scene::description::missing_at_moments;
 use crate::scene::gltf::{FileMoments, MovingFile};
 use crate::scene::{CameraRequest, MomentBuilder, Scene, View};
 use crate::stop::Stop;
-use std::sync::Arc;
 
 /// Number of moments below which the copies of a blurred object are visible.
 const MIN_MOMENTS: u64 = 32;
@@ -40,7 +39,7 @@ pub(super) struct MovingScene<'a> {
     /// Times at which the shutter opens and closes, relative to the frame (frames).
     shutter: [f64; 2],
     /// Where light of the environment arrives; `None` if that is not known.
-    learnt: Option<Arc<LearntSky>>,
+    learnt: LearntLight,
     stop: Stop,
 }
 
@@ -59,15 +58,23 @@ impl<'a> MovingScene<'a> {
         let (scene, camera) = (&request.scene, &request.picture.camera);
         let moments =
             file.map(MovingFile::moments).transpose()?.map(|moments| (moments, MomentBuilder::new(view.scene)));
-        let moving = MovingScene { request: scene, camera, at_frame: view.scene, moments, shutter, learnt: None, stop };
+        let moving = MovingScene {
+            request: scene,
+            camera,
+            at_frame: view.scene,
+            moments,
+            shutter,
+            learnt: LearntLight::default(),
+            stop,
+        };
         // Faults are found before the first iteration.
         moving.at(0.0)?;
         moving.at(1.0)?;
         Ok(Some(moving))
     }
 
-    /// The moving scene with what is known about where light of the environment arrives.
-    pub fn with_learnt_sky(self, learnt: Option<Arc<LearntSky>>) -> MovingScene<'a> {
+    /// The moving scene with what is known about where light arrives.
+    pub fn with_learnt(self, learnt: LearntLight) -> MovingScene<'a> {
         MovingScene { learnt, ..self }
     }
 }
@@ -91,11 +98,7 @@ impl Motion for MovingScene<'_> {
             }
         };
         let camera = scene.camera(self.camera)?;
-        let scene = match &self.learnt {
-            Some(learnt) => scene.with_learnt_sky(Arc::clone(learnt)),
-            None => scene,
-        };
-        Ok((scene, camera))
+        Ok((scene.with_learnt(&self.learnt), camera))
     }
 }
 

@@ -40,7 +40,7 @@ pub enum Domain {
     /// Moments of the shutter interval at which iterations render a moving scene.
     Shutter = 9,
     /// Camera paths that learn where light of the environment arrives.
-    SkyCamera = 10,
+    LearningCamera = 10,
     /// Paths in unit tests.
     Test = 99,
 }

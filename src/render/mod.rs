@@ -19,7 +19,7 @@ pub use input::{Motion, RenderInput};
 pub(crate) use pass::Cost;
 pub use pass::{
     MAX_TECHNIQUES, PHOTON_BYTES, PhotonCounts, Proxy, SecondMoments, TechniquePicture, WHOLE_TILE,
-    bytes_per_whole_tile, learn_sky, photons_per_path, sample_bytes,
+    bytes_per_whole_tile, learn_light, photons_per_path, sample_bytes,
 };
 pub use session::{Control, ExpectedError, MIN_ITERATIONS_FOR_ERROR, Progress, Session, State, render, run_session};
 pub use settings::{

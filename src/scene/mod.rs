@@ -35,7 +35,7 @@ pub use view::View;
 
 use crate::error::Result;
 use crate::geometry::{ALL_LINKINGS, Shapes, Surface};
-use crate::light::{Environment, LearntSky, Light, Lights, Owner};
+use crate::light::{Environment, LearntLight, Light, Lights, Owner};
 use crate::material::{Materials, MediumParameters, Scattering};
 use crate::math::{DVec3, Vec3};
 use crate::trace::Tracer;
@@ -129,10 +129,10 @@ impl Scene {
         build::build(description, threads)
     }
 
-    /// A copy of the scene that knows where light of its environment arrives.
+    /// A copy of the scene that knows where light arrives.
     #[must_use]
-    pub fn with_learnt_sky(&self, learnt: Arc<LearntSky>) -> Scene {
-        Scene { lights: self.lights.clone().with_learnt_sky(learnt), ..self.clone() }
+    pub fn with_learnt(&self, learnt: &LearntLight) -> Scene {
+        Scene { lights: self.lights.clone().with_learnt(learnt), ..self.clone() }
     }
 
     /// A copy of the scene with other materials, medium and environment. The indices of refraction and the coatings of

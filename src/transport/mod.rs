@@ -21,6 +21,7 @@ pub use walk::cause::Cause;
 pub use walk::direct::{balance, direct_light};
 pub use walk::initial_media::{InitialMedia, InitialMedium};
 pub use walk::interior::{Crossing, Interior};
+pub use walk::light_samples::LightBinsOf;
 pub use walk::lobe_layers::{FirstScatter, LobeLayer, LobeLight, LobeRecord};
 pub use walk::pass_through::{BulbHit, PassThroughHit};
 pub use walk::pixel_sample::{Features, INNER_AREAS, MAX_LEVELS, PixelSample};

@@ -45,4 +45,5 @@ mod splitting;
 mod stability;
 mod stopping;
 mod unseen;
+mod walled_lamps;
 mod windows;

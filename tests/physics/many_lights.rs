@@ -43,7 +43,7 @@ fn hall() -> (Description, Vec<[DVec3; 4]>, Vec<(DVec3, f64)>) {
 
 /// Irradiance at `p`, facing up, from a polygon of radiance 1 with counter-clockwise corners as seen from `p` \[Lambert
 /// 1760\].
-fn polygon(p: DVec3, corners: &[DVec3]) -> f64 {
+pub fn polygon(p: DVec3, corners: &[DVec3]) -> f64 {
     let n = corners.len();
     let edge = |k: usize| {
         let (a, b) = ((corners[k] - p).normalize(), (corners[(k + 1) % n] - p).normalize());
@@ -54,7 +54,7 @@ fn polygon(p: DVec3, corners: &[DVec3]) -> f64 {
 
 /// `n` estimates of the irradiance at `p` on the floor. Each is divided by `share`, the probability used over the true
 /// one.
-fn estimates(scene: &Scene, receiver: &Receiver, n: u64, share: impl Fn(&DirectSample) -> f64) -> Vec<f64> {
+pub fn estimates(scene: &Scene, receiver: &Receiver, n: u64, share: impl Fn(&DirectSample) -> f64) -> Vec<f64> {
     let one = |i: u64| {
         let draws = Stream::new(11, 0, Domain::Test, i).vertex(1);
         let (choice, point) = (draws.one_fine(Purpose::LightChoice), draws.two(Purpose::LightPoint));

@@ -10,6 +10,7 @@ mod sums;
 
 use crate::support;
 
+use crate::walled_lamps::{learnt, rooms};
 use bumpalo::Bump;
 use caustique::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use caustique::camera::Camera;
@@ -20,7 +21,7 @@ use caustique::medium::{FlightDensity, HenyeyGreenstein};
 use caustique::path_class::ClassSet;
 use caustique::photon::PhotonMap;
 use caustique::random::{Domain, Purpose, Stream};
-use caustique::render::{Settings, learn_sky};
+use caustique::render::{Settings, learn_light};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene, View};
 use caustique::transport::bidirectional::mis::{self, Eta, Merges, MisState, Ratios, one_merge};
@@ -876,8 +877,15 @@ fn behind_a_window() {
     add(&mut description, "lamp", lamp, Material { double_sided: true, ..matte(0.2, 2.0) });
     let scene = build(description);
     let camera = scene.camera(&square(SIZE)).expect("a camera");
-    let learnt = learn_sky(View::new(&scene, &camera), &Settings::default()).expect("a window is worth learning");
-    check("window", &scene.with_learnt_sky(learnt), 0.1, 4000);
+    let learnt = learn_light(View::new(&scene, &camera), &Settings::default());
+    assert!(learnt.sky.is_some(), "a window is worth learning");
+    check("window", &scene.with_learnt(&learnt), 0.1, 4000);
+}
+
+/// In a room whose lamps were learnt, because brighter ones are behind walls.
+#[test]
+fn between_lamps_behind_walls() {
+    check("lamps behind walls", &learnt(&build(rooms(0.6))), 0.1, 4000);
 }
 
 fn outdoors() -> Description {

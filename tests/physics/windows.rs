@@ -5,11 +5,12 @@
 use crate::support;
 
 use caustique::camera::Camera;
-use caustique::light::{Environment, ImageEnvironment, LearntSky, Receiver, SkySamples};
+use caustique::light::{Environment, ImageEnvironment, LearntSky, LightSamples, Receiver, SkySectors};
 use caustique::math::{DVec3, Rgb, Vec2, Vec3, luminance};
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::render::{
-    Control, InitialBandwidth, Levels, Method, RenderInput, Rendered, Session, Settings, Shard, learn_sky, run_session,
+    Control, InitialBandwidth, Levels, Method, RenderInput, Rendered, Session, Settings, Shard, learn_light,
+    run_session,
 };
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene, View};
@@ -21,13 +22,13 @@ use support::scenes::{add, build, look_at, matte, quad, square, window_room};
 use support::stats::{Check, mean_and_error};
 
 /// Side of the pictures.
-const SIZE: u32 = 16;
+pub const SIZE: u32 = 16;
 
 fn sky() -> Option<EnvironmentDescription> {
     Some(EnvironmentDescription { source: EnvironmentSource::Color(Rgb::ONE), rotation_deg: 0.0, strength: 1.0 })
 }
 
-fn settings(iterations: u64, seed: u64) -> Settings {
+pub fn settings(iterations: u64, seed: u64) -> Settings {
     Settings {
         seed,
         photons: 4096,
@@ -38,12 +39,12 @@ fn settings(iterations: u64, seed: u64) -> Settings {
     }
 }
 
-fn camera(scene: &Scene) -> Camera {
+pub fn camera(scene: &Scene) -> Camera {
     scene.camera(&square(SIZE)).expect("a camera")
 }
 
 /// Renders without learning.
-fn render_plain(scene: &Scene, settings: &Settings) -> Rendered {
+pub fn render_plain(scene: &Scene, settings: &Settings) -> Rendered {
     let camera = camera(scene);
     let input = RenderInput::new(scene, &camera, settings);
     let mut session = Session::new(&input);
@@ -51,11 +52,11 @@ fn render_plain(scene: &Scene, settings: &Settings) -> Rendered {
     session.finish(stop)
 }
 
-fn values(rendered: &Rendered) -> Vec<f64> {
+pub fn values(rendered: &Rendered) -> Vec<f64> {
     rendered.pixels.iter().map(|pixel| pixel.mean(0).x).collect()
 }
 
-fn mean(rendered: &Rendered) -> f64 {
+pub fn mean(rendered: &Rendered) -> f64 {
     let values = values(rendered);
     values.iter().sum::<f64>() / values.len() as f64
 }
@@ -81,7 +82,10 @@ fn expected(albedo: f64) -> f64 {
 fn the_floor_of_a_black_room() {
     let scene = build(window_room(matte(0.0, 0.0), sky()));
     let check = Check { expected: expected(0.8), bias: 5e-3, detects: 0.05 };
-    assert!(learn_sky(View::new(&scene, &camera(&scene)), &settings(1, 0)).is_some(), "a window is worth learning");
+    assert!(
+        learn_light(View::new(&scene, &camera(&scene)), &settings(1, 0)).sky.is_some(),
+        "a window is worth learning"
+    );
     for method in [Method::Path, Method::Bdpt, Method::Vcm, Method::Sppm] {
         let means: Vec<f64> = (0..12).map(|seed| mean(&render(&scene, method, SIZE, &settings(96, seed)))).collect();
         check.run(4, &format!("{method:?}"), &means);
@@ -198,7 +202,7 @@ fn sample_plain(environment: &Environment, at: &Receiver, u: Vec2) -> (Vec3, f32
 
 /// The table for receivers that light reaches from the `visible` directions.
 fn learn(environment: &Environment, visible: impl Fn(Vec3, Vec3) -> bool) -> Option<LearntSky> {
-    let mut samples = SkySamples::default();
+    let (mut samples, sky) = (LightSamples::default(), SkySectors::new(environment));
     for i in 0..4000 {
         let at = receiver(1, i);
         samples.begin(&at, 1.0, (i % 2) as usize, 8);
@@ -206,11 +210,11 @@ fn learn(environment: &Environment, visible: impl Fn(Vec3, Vec3) -> bool) -> Opt
             let (wi, radiance, density) = sample_plain(environment, &at, draw(2, 8 * i + k));
             if visible(at.p, wi) {
                 let bounce = scattered(&at, wi) / density;
-                samples.add(environment, &at, wi, radiance * bounce, bounce);
+                samples.add(sky.lit(&at, wi, radiance * bounce, bounce));
             }
         }
     }
-    LearntSky::learn(environment, &samples)
+    LearntSky::learn(sky, &samples)
 }
 
 /// Mean of `value` over `n` draws, and the variance of the mean.
@@ -287,9 +291,10 @@ fn nothing_is_learnt_in_the_open() {
 fn a_scene_keeps_the_light_of_its_own_sky() {
     let brighter = sky().map(|sky| EnvironmentDescription { strength: 2.0, ..sky });
     let [scene, other] = [sky(), brighter].map(|sky| build(window_room(matte(0.0, 0.0), sky)));
-    let learnt = learn_sky(View::new(&scene, &camera(&scene)), &settings(1, 0)).expect("a window is worth learning");
+    let learnt = learn_light(View::new(&scene, &camera(&scene)), &settings(1, 0));
+    assert!(learnt.sky.is_some(), "a window is worth learning");
     let mut found = Vec::new();
-    let (other, from) = (other.with_learnt_sky(learnt), Receiver::anywhere(Vec3::ZERO));
+    let (other, from) = (other.with_learnt(&learnt), Receiver::anywhere(Vec3::ZERO));
     other.lights.for_each_infinite(&from, Vec3::Y, false, |radiance, _, _, _| found.push(radiance));
     assert_eq!(found, [Rgb::splat(2.0)]);
 }

@@ -6,7 +6,7 @@ use crate::camera::Camera;
 use crate::estimator::{PixelAccumulator, QUARTERS};
 use crate::render::account::{Rendered, StopReason};
 use crate::render::input::RenderInput;
-use crate::render::pass::learn_sky;
+use crate::render::pass::learn_light;
 use crate::render::settings::Settings;
 use crate::scene::{Scene, View};
 
@@ -24,7 +24,8 @@ pub fn render(
     settings: &Settings,
     mut observe: impl FnMut(&Progress, &[PixelAccumulator]) -> Control,
 ) -> Rendered {
-    let learnt = learn_sky(View::new(scene, camera), settings).map(|sky| scene.with_learnt_sky(sky));
+    let learnt = learn_light(View::new(scene, camera), settings);
+    let learnt = (!learnt.is_empty()).then(|| scene.with_learnt(&learnt));
     let input = RenderInput::new(learnt.as_ref().unwrap_or(scene), camera, settings);
     let mut session = Session::new(&input);
     let stop = run_session(&mut session, |progress, session| observe(progress, session.pixels()));

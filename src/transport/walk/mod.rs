@@ -8,6 +8,7 @@ pub(in crate::transport) mod fire;
 pub(in crate::transport) mod flight;
 pub(in crate::transport) mod initial_media;
 pub(in crate::transport) mod interior;
+pub(in crate::transport) mod light_samples;
 pub(in crate::transport) mod lobe_layers;
 pub(in crate::transport) mod pass_through;
 pub(in crate::transport) mod pixel_sample;
@@ -15,7 +16,6 @@ pub(in crate::transport) mod probe;
 pub(in crate::transport) mod roulette;
 pub(in crate::transport) mod scattering_vertex;
 pub(in crate::transport) mod segment;
-mod sky_samples;
 pub(in crate::transport) mod vertex;
 pub(in crate::transport) mod visible;
 
