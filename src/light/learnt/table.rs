@@ -20,7 +20,7 @@ const MAX_RECEIVERS: usize = 128;
 const MAX_DEPTH: u32 = 40;
 /// Largest second moment of light samples in a cell, over that without the table, for the cell to be used, and largest
 /// ratio of all together for the table to be used. A look-up takes a twentieth of the time of a path.
-const MAX_CELL_RATIO: f64 = 0.5;
+const MAX_CELL_RATIO: f64 = 0.8;
 const MAX_TABLE_RATIO: f64 = 0.8;
 /// Sides that normals face: along the three axes and against them, and none.
 const SIDES: usize = 7;
