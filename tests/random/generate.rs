@@ -20,6 +20,8 @@ const FIRST_WITH_LINKS: u64 = 3000;
 const FIRST_WITH_WINDOWS: u64 = 4000;
 /// First seed of scenes with shadow linking.
 const FIRST_WITH_SHADOW_LINKS: u64 = 5000;
+/// First seed of scenes with lamps outside of the room.
+const FIRST_WITH_OUTER_LAMPS: u64 = 6000;
 /// Number of attempts to find a place for a thing.
 const ATTEMPTS: usize = 40;
 
@@ -59,6 +61,9 @@ pub fn generate(seed: u64) -> World {
         }
         if seed >= FIRST_WITH_WINDOWS && generator.closed && generator.random.chance(0.4) {
             generator.window();
+        }
+        if seed >= FIRST_WITH_OUTER_LAMPS && generator.closed && generator.random.chance(0.5) {
+            generator.outer_lamps();
         }
         generator.random = own;
     }
@@ -538,6 +543,19 @@ impl Generator {
             thing.name += " with a window";
         }
         self.world.sky = Some(self.color(0.5, 2.0));
+    }
+
+    /// Adds bright lamps behind the walls, ceiling and floor of a room.
+    fn outer_lamps(&mut self) {
+        let half = self.room * DVec3::new(1.0, 0.5, 1.0);
+        for _ in 0..2 + self.random.below(3) {
+            let mut at = self.random.vector(-0.8, 0.8);
+            at[self.random.below(3)] = self.random.within(1.1, 1.3) * if self.random.chance(0.5) { 1.0 } else { -1.0 };
+            let radius = self.random.within(0.01, 0.03);
+            let emission = self.color(10.0, 40.0) / (4.0 * PI * radius * radius);
+            let place = Placement { scale: DVec3::splat(radius), ..Placement::at(half * (DVec3::Y + at)) };
+            self.world.add("lamp behind a wall", sphere(16, true), Matter::glowing(emission), vec![place]);
+        }
     }
 
     /// Adds a solid that overlaps a floating one.

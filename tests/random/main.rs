@@ -24,7 +24,8 @@ mod usd;
 mod world;
 mod write;
 
-use caustique::render::Method;
+use caustique::render::{Method, Settings, learn_light};
+use caustique::scene::View;
 use forms::{FORMS, Form};
 use generate::generate;
 use picture::{SEEDS, Shot, differences, pictures, read};
@@ -64,6 +65,23 @@ fn relations_hold() {
 fn relations_hold_behind_windows() {
     let has_window = |seed: &u64| generate(*seed).things.iter().any(|thing| thing.name.ends_with("with a window"));
     let rooms: Vec<u64> = (4000..4100).filter(has_window).take(3).collect();
+    assert_eq!(rooms.len(), 3, "{rooms:?}");
+    check_relations(rooms);
+}
+
+/// Rooms with bright lamps behind their walls, where renders learn which lights arrive.
+#[test]
+fn relations_hold_beside_lamps_behind_walls() {
+    let learns = |seed: &u64| {
+        let world = generate(*seed);
+        if !world.things.iter().any(|thing| thing.name.starts_with("lamp behind a wall")) {
+            return false;
+        }
+        let scene = read(&world).expect("the scene is read");
+        let camera = scene.camera(&Shot::new(Method::Path, world.cameras()[0]).view()).expect("a camera");
+        learn_light(View::new(&scene, &camera), &Settings::default()).lights.is_some()
+    };
+    let rooms: Vec<u64> = (6000..6060).filter(learns).take(3).collect();
     assert_eq!(rooms.len(), 3, "{rooms:?}");
     check_relations(rooms);
 }

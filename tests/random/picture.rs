@@ -86,7 +86,7 @@ impl Shot {
         }
     }
 
-    fn view(&self) -> CameraRequest {
+    pub fn view(&self) -> CameraRequest {
         let tile = SIZE / TILES;
         CameraRequest {
             camera: Some(if self.usd { usd::camera(&self.camera) } else { self.camera.clone() }),
