@@ -72,4 +72,8 @@ def goals(cells, main):
             if others:
                 fixed.append(ratio(cell["ours"][main]["delivered"], best(others, figure), figure, floor(cell)))
         found[f"{main} / best fixed method, within 1.1: {figure}"] = summary(fixed, 1.1)
+        for other in sorted({name for cell in whole for name in cell["ours"] if name.startswith(f"{main} ")}):
+            pairs = [(cell, cell["ours"][other]["delivered"]) for cell in whole if other in cell["ours"]]
+            ratios = [ratio(its, cell["ours"][main]["delivered"], figure, floor(cell)) for cell, its in pairs]
+            found[f"{other} / {main}: {figure}"] = summary(ratios)
     return {name: value for name, value in found.items() if value}

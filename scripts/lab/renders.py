@@ -38,29 +38,31 @@ def has_option(option):
     return f"{option} " in done.stdout
 
 
-def render(scene, method, denoise, budget, seed, binary=BIN, frame=None):
-    """Renders a scene, or a frame of it, by a program, unless the cache has the render; returns the folder. Raises
-    Failed if the program refuses the render, which the cache also stores."""
+def render(scene, method, denoise, budget, seed, binary=BIN, frame=None, model=None):
+    """Renders a scene, or a frame of it, by a program, with the file of a network or without, unless the cache has the
+    render; returns the folder. Raises Failed if the program refuses the render, which the cache also stores."""
     name = f"{method}-{denoise or 'default'}-{budget:g}s-{options.clock}-{options.threads}-seed{seed}-{options.width}"
     if options.render_options:
         name += "".join(c if c.isalnum() else "_" for c in " ".join(options.render_options))
+    if model:
+        name += f"-{digest(model)}"
     folder = CACHE / "renders" / program(binary) / scene_key(scene) / f"{name}{frame_suffix(frame)}"
     known = load(folder / "run.json")
     if known is None:
         with create(folder) as draft:
-            known = _render(scene, method, denoise, budget, seed, draft / "picture.exr", binary, frame)
+            known = _render(scene, method, denoise, budget, seed, draft / "picture.exr", binary, frame, model)
             save(draft / "run.json", known)
     if "refused" in known:
         raise Failed(known["refused"])
     return folder
 
 
-def _render(scene, method, denoise, budget, seed, file, binary, frame):
+def _render(scene, method, denoise, budget, seed, file, binary, frame, model):
     if denoise and not has_option("--denoise"):
         return {"refused": "not available: this program has no --denoise"}
     settings = {"method": method, "seed": seed, "width": options.width, "threads": options.threads, "frames": frame}
     line = command("render", scene, "-o", file, **settings, progress="none", denoise=denoise or None, program=binary)
-    line += options.render_options
+    line += options.render_options + (["--model", str(model)] if model else [])
     seconds, stop = budget, ["--time", f"{budget:.3f}"]
     for _ in range(MAX_TRIES if options.clock == "cpu" else 1):
         try:

@@ -96,6 +96,7 @@ class Goals(unittest.TestCase):
                 "oidn": figures(0.04),
             }
         }
+        ours["auto network"] = {"delivered": figures(0.03)}
         ours["path"] = {"delivered": figures(0.01), "noisy": figures(0.01), "oidn": figures(0.01)}
         cell = {
             "floor": 1e-9,
@@ -106,6 +107,7 @@ class Goals(unittest.TestCase):
         self.assertEqual(found["auto / best peer with OIDN: flip"]["geometric_mean"], 0.4)
         self.assertEqual(found["auto / OIDN alone: grain"], {"geometric_mean": 0.5, "worst": 0.5, "within": 1, "of": 1})
         self.assertEqual(found["all methods / OIDN alone: grain"]["of"], 2)
+        self.assertEqual(found["auto network / auto: flip"]["geometric_mean"], 1.5)
         self.assertEqual(found["auto / best fixed method, within 1.1: relmse"]["within"], 0)
         self.assertEqual(found["auto / best of its own inputs, within 1.02: relmse"]["within"], 0)
         self.assertEqual(found["all methods / best of its own inputs, within 1.02: relmse"]["within"], 1)

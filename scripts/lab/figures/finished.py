@@ -9,8 +9,8 @@ CAUSTIQUE_BIN names the program, and CAUSTIQUE_CACHE the cache (by default caust
 
 scripts/compare/setup.sh peers installs the other renderers and OIDN; their drivers are in scripts/compare/peers. Other
 renderers always have the budget in core-seconds (seconds times threads); with --clock wall, our renders have at most
-that. Rows give the core-seconds used. --before PROGRAM adds the `auto` of another program. A last table lists what
-`auto` has chosen, and why.
+that. Rows give the core-seconds used. --before PROGRAM adds the `auto` of another program, --model FILE that with a
+network of the finish, and both are compared with `auto`. A last table lists what `auto` has chosen, and why.
 """
 
 import sys
@@ -28,6 +28,7 @@ ARGUMENTS = references.ARGUMENTS | {
     "seeds": 1,
     "methods": ["auto", "path", "bdpt", "vcm", "sppm", "cppm"],
     "before": "",
+    "model": "",
     "denoise": ["default"],
     "render_options": [],
     "clock": "wall",
@@ -37,6 +38,8 @@ SHORT = {"width": 240, "budgets": [10.0], "methods": ["auto", "path", "bdpt", "s
 # Renders with --clock wall that used a smaller share of their cores get a note.
 MIN_CORE_SHARE = 0.8
 KINDS = {"second": "second", "twin": "twins"}
+# Rows of `auto` by another program, and with a network of the finish.
+BEFORE, NETWORK = "auto before", "auto network"
 COLUMNS = f"{'':<36}{'core-s':>8}{'relMSE':>11}{'trimmed':>11}{'FLIP':>9}{'grain':>11}{'trimmed':>11}"
 COLUMNS += f"{'inside:':>8}{'FLIP':>9}{'grain':>11}{'mean':>8}"
 
@@ -79,9 +82,13 @@ def seeds(make, figures):
 
 
 def programs():
-    """The methods with the program that renders each, and the name of the row."""
-    rows = [(method, BIN, method) for method in options.methods]
-    return rows + ([("auto", Path(options.before).resolve(), "auto before")] if options.before else [])
+    """The methods with the program that renders each, the name of the row, and the network of the finish."""
+    rows = [(method, BIN, method, None) for method in options.methods]
+    if options.before:
+        rows.append(("auto", Path(options.before).resolve(), BEFORE, None))
+    if options.model:
+        rows.append(("auto", BIN, NETWORK, Path(options.model).resolve()))
+    return rows
 
 
 def new_cell(scene, budget, reference):
@@ -93,11 +100,11 @@ def new_cell(scene, budget, reference):
 def ours(scene, budget, reference, halves, cell):
     """Measures our renders of a scene at a budget, and adds them to a cell."""
     for denoise in denoisers():
-        for method, binary, label in programs():
+        for method, binary, label, model in programs():
             name = f"{label} {denoise}".strip()
             try:
                 pictures, spent, facts = seeds(
-                    lambda seed: renders.render(scene, method, denoise, budget, seed, binary),
+                    lambda seed: renders.render(scene, method, denoise, budget, seed, binary, model=model),
                     lambda folder: renders.figures(folder, reference, halves, renders.pictures),
                 )
             except Failed as failed:

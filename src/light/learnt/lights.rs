@@ -37,6 +37,11 @@ impl LightBins {
         several.then(|| LightBins { lights: Arc::clone(lights), near, powers })
     }
 
+    /// Whether samples of a trial promise that it pays to learn.
+    pub fn promise(&self, samples: &LightSamples) -> bool {
+        LearntTable::<ROWS, COLUMNS>::promise(samples, &self.powers)
+    }
+
     /// The sample of the light with an index at a receiver. `value`: the light that the receiver scatters, over the
     /// density of the sample. `bounce`: density with which a bounce finds the point of the light, over that of the sample.
     pub fn lit(&self, at: &Receiver, light: u32, value: f32, bounce: f32) -> LitSample {

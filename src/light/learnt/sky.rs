@@ -18,6 +18,11 @@ impl SkySectors {
         SkySectors { environment: environment.clone(), sectors: environment.sectors() }
     }
 
+    /// Whether samples of a trial promise that it pays to learn.
+    pub fn promise(&self, samples: &LightSamples) -> bool {
+        LearntTable::<SECTOR_ROWS, SECTOR_COLUMNS>::promise(samples, &self.sectors.probabilities)
+    }
+
     /// The light sample of a receiver in the direction `wi`, sampled by [`Environment::sample_at`]. `value`: the light
     /// that the receiver scatters, over the density of the sample. `bounce`: density with which a bounce finds the
     /// direction, over that of the sample.

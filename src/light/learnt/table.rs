@@ -19,9 +19,11 @@ const MAX_RECEIVERS: usize = 128;
 /// Levels of the tree, which equal positions end.
 const MAX_DEPTH: u32 = 40;
 /// Largest second moment of light samples in a cell, over that without the table, for the cell to be used, and largest
-/// ratio of all together for the table to be used. A look-up takes a twentieth of the time of a path.
+/// ratio of all together for the table to be used. A look-up takes a twentieth of the time of a path. A trial has fewer
+/// samples, which promise less.
 const MAX_CELL_RATIO: f64 = 0.8;
 const MAX_TABLE_RATIO: f64 = 0.8;
+const MAX_TRIAL_RATIO: f64 = 0.95;
 /// Sides that normals face: along the three axes and against them, and none.
 const SIDES: usize = 7;
 /// Index of a cell that is not used.
@@ -186,6 +188,17 @@ impl<const ROWS: usize, const COLUMNS: usize> LearntTable<ROWS, COLUMNS> {
     /// Learns from light samples; `None` if the table would not reduce the noise. `prior`: for each bin, its probability
     /// if nothing is known about the receiver. Bins without probability are never selected.
     pub fn learn(samples: &LightSamples, prior: &[f32]) -> Option<LearntTable<ROWS, COLUMNS>> {
+        let (table, ratio) = LearntTable::build(samples, prior);
+        (ratio < MAX_TABLE_RATIO).then_some(table)
+    }
+
+    /// Whether samples of a trial promise that a table reduces the noise.
+    pub fn promise(samples: &LightSamples, prior: &[f32]) -> bool {
+        LearntTable::<ROWS, COLUMNS>::build(samples, prior).1 < MAX_TRIAL_RATIO
+    }
+
+    /// The table, and the expected second moment with it over that without.
+    fn build(samples: &LightSamples, prior: &[f32]) -> (LearntTable<ROWS, COLUMNS>, f64) {
         let table = LearntTable { roots: [NONE; SIDES], nodes: Vec::new(), cells: Vec::new() };
         let mut builder = Builder { samples, prior, table, without: 0.0, learnt: 0.0 };
         for side in 0..SIDES {
@@ -198,7 +211,8 @@ impl<const ROWS: usize, const COLUMNS: usize> LearntTable<ROWS, COLUMNS> {
                 builder.build(root, &mut order, &prior, 0);
             }
         }
-        (builder.learnt < MAX_TABLE_RATIO * builder.without).then_some(builder.table)
+        let ratio = if builder.without > 0.0 { builder.learnt / builder.without } else { 1.0 };
+        (builder.table, ratio)
     }
 
     /// The cell of a receiver; `None` where the table knows nothing.
