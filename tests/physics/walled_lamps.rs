@@ -79,7 +79,7 @@ fn the_floor_of_a_black_room() {
     let check = Check { expected: expected(), bias: 2e-3, detects: 0.05 };
     for method in [Method::Path, Method::Bdpt, Method::Vcm, Method::Sppm] {
         // Most light paths start in other rooms.
-        let settings = |seed| Settings { photons: 1 << 16, ..settings(48, seed) };
+        let settings = |seed| Settings { photons: 1 << 14, ..settings(12, seed) };
         let means: Vec<f64> = (0..8).map(|seed| mean(&render(&scene, method, SIZE, &settings(seed)))).collect();
         check.run(4, &format!("{method:?}"), &means);
     }
@@ -127,7 +127,7 @@ fn what_is_learnt_changes_the_noise_alone() {
     let grey = build(rooms(0.6));
     learnt(&grey);
     for method in [Method::Path, Method::Bdpt, Method::Vcm] {
-        let of = |seed| Settings { method, photons: 1 << 14, ..settings(16, seed) };
+        let of = |seed| Settings { method, ..settings(6, seed) };
         let means = |render: &dyn Fn(u64) -> Rendered| (0..16).map(|seed| mean(&render(seed))).collect::<Vec<f64>>();
         let learnt = mean_and_error(&means(&|seed| render(&grey, method, SIZE, &of(seed))));
         let plain = mean_and_error(&means(&|seed| render_plain(&grey, &of(100 + seed))));
