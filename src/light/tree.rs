@@ -448,11 +448,11 @@ mod tests {
             let (mut count, mut none) = (vec![0u32; emitters.len()], 0);
             for k in 0..n {
                 // The bound of a cluster may be positive although those of both children are zero.
-                let Some((index, pdf)) = tree.sample(&at, (f64::from(k) + 0.5) / f64::from(n)) else {
+                let Some((index, own)) = tree.sample(&at, (f64::from(k) + 0.5) / f64::from(n)) else {
                     none += 1;
                     continue;
                 };
-                assert!((pdf - pdf(&tree, &at, index)).abs() <= 1e-4 * pdf, "{pdf} {}", pdf(&tree, &at, index));
+                assert!((own - pdf(&tree, &at, index)).abs() <= 1e-4 * own, "{own} {}", pdf(&tree, &at, index));
                 count[index] += 1;
             }
             assert!((sum + none as f32 / n as f32 - 1.0).abs() < 2e-3, "{sum} and {none} at {p}");

@@ -152,7 +152,7 @@ fn absorbing() -> Vec<Case> {
 
 #[test]
 fn hidden_solids_do_not_absorb_camera_rays() {
-    check(absorbing(), &METHODS, 1500);
+    check(absorbing(), &METHODS, 700);
 }
 
 #[test]
@@ -171,7 +171,7 @@ fn check(cases: Vec<Case>, methods: &[Method], photons: u32) {
                 method,
                 photons,
                 // These two have as many light paths as pixels.
-                iterations: Some(if matches!(method, Method::Light | Method::Bpm) { 1000 } else { 4 }),
+                iterations: Some(if matches!(method, Method::Light | Method::Bpm) { 500 } else { 4 }),
                 levels: Levels::new(1),
                 initial_bandwidth: InitialBandwidth::Fixed(0.1),
                 alpha: method.default_alpha(),

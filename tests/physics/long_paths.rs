@@ -53,7 +53,7 @@ fn furnace_of_white_walls() {
     add(&mut description, "box", cuboid(Vec3::splat(-1.0), Vec3::ONE, true), matte(0.999, 1.0));
     description.cameras.push(look_at(DVec3::new(0.1, 0.2, -0.3), DVec3::new(0.0, 0.0, 1.0), 40.0));
     let scene = build(description);
-    check("white walls", &means(&scene, &settings(Method::Path, 16), 8, 16), 1000.0, (1e-3, 0.1));
+    check("white walls", &means(&scene, &settings(Method::Path, 8), 8, 16), 1000.0, (1e-3, 0.1));
 }
 
 /// A ball of a medium without absorption is invisible under a uniform sky, at any density: nearly all light returns

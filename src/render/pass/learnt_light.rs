@@ -14,7 +14,7 @@ use std::sync::Arc;
 /// Number of pixels per path that learns, and bounds of the number of paths. It does not depend on the number of
 /// iterations, so that shards and resumed renders learn the same.
 const PIXELS_PER_PATH: u64 = 4;
-/// Share of the paths that a trial takes, which finds scenes where there is nothing to learn.
+/// Share of the paths that a trial takes, which finds scenes where there is nothing to learn. Small pictures have none.
 const TRIAL_SHARE: u64 = 8;
 const MIN_PATHS: u64 = 1 << 10;
 const MAX_PATHS: u64 = 1 << 15;
@@ -37,38 +37,44 @@ fn learn_sky(view: View<'_>, settings: &Settings) -> Option<LearntSky> {
         return None;
     }
     let sectors = SkySectors::new(environment);
-    let sample = |share| sample(view, settings, LightBinsOf::Sky(&sectors), share);
-    if !sectors.promise(&sample(TRIAL_SHARE)?) {
-        return None;
-    }
-    let samples = sample(1)?;
+    let samples = samples(view, settings, LightBinsOf::Sky(&sectors), |trial| sectors.promise(trial))?;
     LearntSky::learn(sectors, &samples)
 }
 
 fn learn_lights(view: View<'_>, settings: &Settings) -> Option<LearntLights> {
     let bins = view.scene.lights.bins()?;
-    let sample = |share| sample(view, settings, LightBinsOf::Lights(&bins), share);
-    if !bins.promise(&sample(TRIAL_SHARE)?) {
-        return None;
-    }
-    let samples = sample(1)?;
+    let samples = samples(view, settings, LightBinsOf::Lights(&bins), |trial| bins.promise(trial))?;
     LearntLights::learn(bins, &samples)
 }
 
-/// Light samples along camera paths, one in `share` of those that learn; `None` if the render is stopped, and some paths
-/// are missing.
+/// Light samples along camera paths; `None` if those of a trial do not `promise` less noise, or if the render is stopped.
+fn samples(
+    view: View<'_>,
+    settings: &Settings,
+    bins: LightBinsOf<'_>,
+    promise: impl Fn(&LightSamples) -> bool,
+) -> Option<LightSamples> {
+    let (width, height) = view.camera.uncropped().size();
+    let paths = (u64::from(width) * u64::from(height) / PIXELS_PER_PATH).clamp(MIN_PATHS, MAX_PATHS);
+    let trial = (paths / TRIAL_SHARE).max(MIN_PATHS);
+    if 2 * trial < paths && !promise(&sample(view, settings, bins, trial)?) {
+        return None;
+    }
+    sample(view, settings, bins, paths)
+}
+
+/// Light samples along a number of camera paths; `None` if the render is stopped, and some are missing.
 fn sample(
     View { scene, camera }: View<'_>,
     settings: &Settings,
     bins: LightBinsOf<'_>,
-    share: u64,
+    paths: u64,
 ) -> Option<LightSamples> {
     // A crop window shows a part of the whole picture, to the bit.
     let camera: &Camera = &camera.uncropped();
     let camera_paths = settings.camera_paths(scene, camera, &InitialMedia::of(scene, camera));
     let (width, height) = camera.size();
     let pixels = u64::from(width) * u64::from(height);
-    let paths = (pixels / PIXELS_PER_PATH).clamp(MIN_PATHS, MAX_PATHS) / share;
     let trace = |first: u64| {
         let (mut samples, mut arena) = (LightSamples::default(), Bump::new());
         for index in (first..paths.min(first + CHUNK)).take_while(|_| !camera_paths.is_stopped()) {
