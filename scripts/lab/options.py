@@ -37,6 +37,7 @@ def budget(text):
 
 KNOWN = {
     "before": Argument(str, "another build of the program"),
+    "model": Argument(str, "the file of a network of the finish"),
     "budgets": Argument(numbers, "seconds of a render; one render for each number"),
     "clock": Argument(str, "wall, or cpu: budgets are core-seconds divided by threads"),
     "denoise": Argument(names, "values of --denoise; one render for each; `default` omits the option"),

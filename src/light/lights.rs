@@ -11,7 +11,10 @@ use super::group::{Group, Groups};
 use super::kind::{
     Emitter, EnvironmentLight, Light, LightRay, Owner, SceneParts, Selected, TriangleLight, VolumeLight,
 };
-use super::learnt::{LearntLight, LearntSky, LightBins};
+use super::learnt::LearntLight;
+use super::learnt_lights::LightBins;
+use super::learnt_sky::LearntSky;
+use super::learnt_table::LitSample;
 use super::links::{LightLinks, LinkedObjects, Linking};
 use super::receiver::Receiver;
 use super::sampler::LightSampler;
@@ -136,7 +139,15 @@ impl Lights {
 
     /// The bins of lights for which probabilities can be learnt; `None` if there is nothing to choose.
     pub fn bins(&self) -> Option<LightBins> {
-        LightBins::new(self.choice.as_ref()?)
+        self.choice.as_ref()?.bins()
+    }
+
+    /// The sample of the light with an index at a receiver, from which `bins` learn. `value`: the light that the receiver
+    /// scatters, over the density of the sample. `bounce`: density with which a bounce finds the point of the light, over
+    /// that of the sample.
+    pub fn lit(&self, bins: &LightBins, at: &Receiver, light: u32, value: f32, bounce: f32) -> LitSample {
+        let probability = self.choice.as_ref().map_or(0.0, |choice| choice.pdf(at, light as usize));
+        bins.lit(at, light, probability, value, bounce)
     }
 
     /// Limits the light and the shadows of lights to some objects.

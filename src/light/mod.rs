@@ -10,8 +10,12 @@ mod emission;
 mod environment;
 mod group;
 pub mod guide;
+mod irradiance;
 mod kind;
 mod learnt;
+mod learnt_lights;
+mod learnt_sky;
+mod learnt_table;
 mod lights;
 mod links;
 mod picture;
@@ -37,7 +41,10 @@ pub use kind::{
     Emitter, EnvironmentLight, Light, LightPlacement, Owner, PointLight, PunctualKind, ShapedLight, SpotLight,
     SunLight, TriangleLight, VolumeLight,
 };
-pub use learnt::{LearntLight, LearntLights, LearntSky, LightBins, LightSamples, LitSample, SkySectors};
+pub use learnt::LearntLight;
+pub use learnt_lights::{LearntLights, LightBins};
+pub use learnt_sky::{LearntSky, SkySectors};
+pub use learnt_table::{LightSamples, LitSample};
 pub use lights::Lights;
 pub use links::{LightLinks, LinkedObjects, Linking, MAX_LINKINGS};
 pub use picture::Picture;

@@ -2,7 +2,7 @@
 
 use super::Environment;
 use super::environment::EnvironmentSample;
-use super::learnt::LearntSky;
+use super::learnt_sky::LearntSky;
 use super::receiver::Receiver;
 use crate::math::{Frame, Rgb, Vec2, Vec3, warp};
 use std::f32::consts::PI;

@@ -8,6 +8,7 @@
 use super::check::check_picture;
 use super::choose::{choose, chosen_before};
 use super::finish::OpenFinish;
+use super::learn::Learnt;
 use super::load::Loaded;
 use super::memory::{MemoryCheck, MemoryLimit};
 use super::request::PictureRequest;
@@ -114,6 +115,9 @@ pub fn render_live(
         }
         wait_for_next(&request.stop);
     }
+    let learnt = Learnt::new(view, &checked.settings, &request.stop);
+    let lit = learnt.scene(scene);
+    let view = View::new(lit.as_ref().unwrap_or(scene), &checked.camera);
     let iterations = checked.settings.iterations;
     let chosen = known.unwrap_or_else(|| {
         let most = iterations.map_or(MAX_CHOICE_ITERATIONS, |iterations| iterations.min(MAX_CHOICE_ITERATIONS));
@@ -126,7 +130,7 @@ pub fn render_live(
     }
     let candidate = chosen.candidate;
     let settings = fit(Settings { iterations, ..chosen.settings })?;
-    let input = RenderInput::new(scene, &checked.camera, &settings);
+    let input = RenderInput::new(view.scene, &checked.camera, &settings);
     let (progress, reason, failure) = run(&input, finish, false, show)?;
     failure.map_or(Ok(LiveEnd { progress, reason, candidate }), Err)
 }

@@ -38,10 +38,10 @@ impl LightBinsOf<'_> {
     }
 
     /// A light sample with its bin; [`LitSample`] explains `value` and `bounce`.
-    fn lit(self, at: &Receiver, light: &DirectSample, value: f32, bounce: f32) -> LitSample {
+    fn lit(self, scene: &Scene, at: &Receiver, light: &DirectSample, value: f32, bounce: f32) -> LitSample {
         match self {
             LightBinsOf::Sky(sky) => sky.lit(at, light.wi, value, bounce),
-            LightBinsOf::Lights(lights) => lights.lit(at, light.light, value, bounce),
+            LightBinsOf::Lights(bins) => scene.lights.lit(bins, at, light.light, value, bounce),
         }
     }
 }
@@ -74,7 +74,7 @@ impl<'a> Visitor<'a> for SampleLight<'a, '_> {
             let value = luminance(arriving * vertex.shadow_ray_to_light(scene, &light).transmittance);
             // No bounce finds a delta light.
             let bounce = if light.delta { 0.0 } else { bounce * vertex.survival(LobeSet::ALL) / light.pdf_w };
-            self.samples.add(self.bins.lit(&at, &light, value, bounce));
+            self.samples.add(self.bins.lit(scene, &at, &light, value, bounce));
         }
         Next::Continue(LobeSet::ALL)
     }

@@ -1,18 +1,10 @@
-//! Where light arrives, learnt before a render.
+//! What was learnt about the light of a picture before a render.
 
-mod lights;
-mod sky;
-mod table;
-
-pub(super) use lights::{BINS, LightCell};
-pub use lights::{LearntLights, LightBins};
-pub use sky::{LearntSky, SkySectors};
-pub(super) use table::LEARNT_SHARE;
-pub use table::{LightSamples, LitSample};
-
+use super::learnt_lights::LearntLights;
+use super::learnt_sky::LearntSky;
 use std::sync::Arc;
 
-/// What was learnt about the light of a picture.
+/// Where light arrives in a picture.
 #[derive(Clone, Default)]
 pub struct LearntLight {
     /// From where light of the environment arrives; `None` if knowing it would not reduce the noise.

@@ -6,7 +6,7 @@
 //! minimum variance that is, and which includes visibility; the rest is the sampling without the table, so that weights
 //! stay bounded. A cell whose samples promise no gain is dropped, and so is the table if no cell is left.
 
-use crate::light::receiver::Receiver;
+use super::receiver::Receiver;
 use crate::math::Vec3;
 use std::array::from_fn;
 

@@ -1,9 +1,9 @@
 //! Directions of the environment from which light arrives at a place, learnt before a render. The bins of the table are
 //! the sectors of the environment; within a sector, the density is that of [`Environment::sample`].
 
-use super::table::{Cell, LEARNT_SHARE, LearntTable, LightSamples, LitSample};
-use crate::light::environment::{Environment, EnvironmentSample, SECTOR_COLUMNS, SECTOR_ROWS, Sectors};
-use crate::light::receiver::Receiver;
+use super::environment::{Environment, EnvironmentSample, SECTOR_COLUMNS, SECTOR_ROWS, Sectors};
+use super::learnt_table::{Cell, LEARNT_SHARE, LearntTable, LightSamples, LitSample};
+use super::receiver::Receiver;
 use crate::math::{Rgb, Vec2, Vec3};
 
 /// An environment, divided into sectors.
