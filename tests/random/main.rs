@@ -38,7 +38,7 @@ const SCENES: Range<u64> = 0..20;
 /// Seeds of scenes for the tests marked long.
 const MORE_SCENES: Range<u64> = 20..60;
 /// Number of scenes of each form with a known picture.
-const KNOWN: u64 = 8;
+const KNOWN: u64 = 6;
 /// Number of scenes that are also read as USD stages. Each starts a converter at most three times.
 const STAGES: u64 = 4;
 
@@ -64,8 +64,8 @@ fn relations_hold() {
 #[test]
 fn relations_hold_behind_windows() {
     let has_window = |seed: &u64| generate(*seed).things.iter().any(|thing| thing.name.ends_with("with a window"));
-    let rooms: Vec<u64> = (4000..4100).filter(has_window).take(3).collect();
-    assert_eq!(rooms.len(), 3, "{rooms:?}");
+    let rooms: Vec<u64> = (4000..4100).filter(has_window).take(2).collect();
+    assert_eq!(rooms.len(), 2, "{rooms:?}");
     check_relations(rooms);
 }
 
@@ -81,8 +81,8 @@ fn relations_hold_beside_lamps_behind_walls() {
         let camera = scene.camera(&Shot::new(Method::Path, world.cameras()[0]).view()).expect("a camera");
         learn_light(View::new(&scene, &camera), &Settings::default()).lights.is_some()
     };
-    let rooms: Vec<u64> = (6000..6060).filter(learns).take(3).collect();
-    assert_eq!(rooms.len(), 3, "{rooms:?}");
+    let rooms: Vec<u64> = (6000..6060).filter(learns).take(2).collect();
+    assert_eq!(rooms.len(), 2, "{rooms:?}");
     check_relations(rooms);
 }
 
