@@ -3,11 +3,11 @@
 
 use crate::many_lights::{estimates, polygon};
 use crate::support;
-use crate::windows::{SIZE, camera, mean, render_plain, settings, values};
+use crate::windows::{SIZE, camera, keeps_the_mean, lowers_the_noise, mean, render_plain, settings, values};
 
-use caustique::light::Receiver;
+use caustique::light::{DirectSample, Receiver};
 use caustique::math::{DVec3, Vec3};
-use caustique::render::{Method, Rendered, Settings, learn_light};
+use caustique::render::{Method, Settings, learn_light};
 use caustique::scene::{Description, Scene, View};
 use support::render;
 use support::scenes::{add, build, cuboid, look_at, matte, quad};
@@ -97,8 +97,8 @@ fn lamps_behind_walls_are_rarely_sampled() {
         let p = DVec3::new(0.2 * f64::from(k) - 0.3, 0.0, 0.1 * f64::from(k) - 0.2);
         let receiver = Receiver { n: Vec3::Y, ..Receiver::anywhere(p.as_vec3()) };
         let visible = |x: f32| f64::from(u8::from(x.abs() < 1.0));
-        let own = |light: &caustique::light::DirectSample| light.target.map_or(0.0, |target| visible(target.x));
-        let planted = |light: &caustique::light::DirectSample| {
+        let own = |light: &DirectSample| light.target.map_or(0.0, |target| visible(target.x));
+        let planted = |light: &DirectSample| {
             let ratio = |of: &Scene| f64::from(of.lights.next_event_ratio(&receiver, light.light, light.wi));
             own(light) * ratio(&scene) / ratio(&plain)
         };
@@ -109,16 +109,7 @@ fn lamps_behind_walls_are_rarely_sampled() {
         assert!((mean - expected).abs() < critical * error, "at {p}: {mean} +- {error}, expected {expected}");
         assert!((wrong - expected).abs() > critical * wrong_error, "at {p}: another density is not detected");
     }
-    let variance = |render: &dyn Fn(u64) -> Rendered| {
-        let pictures: Vec<Vec<f64>> = (0..16).map(|seed| values(&render(seed))).collect();
-        let of_pixel = |i| mean_and_error(&pictures.iter().map(|picture| picture[i]).collect::<Vec<f64>>()).1.powi(2);
-        (0..pictures[0].len()).map(of_pixel).sum::<f64>()
-    };
-    let of = |seed| Settings { method: Method::Path, ..settings(4, seed) };
-    let ratio = variance(&|seed| render(&plain, Method::Path, SIZE, &of(seed)))
-        / variance(&|seed| render_plain(&plain, &of(seed)));
-    println!("variance of direct light: {ratio}");
-    assert!(ratio < 0.3, "{ratio}");
+    lowers_the_noise(&plain);
 }
 
 /// In rooms with grey walls, rendering with what was learnt gives the picture without.
@@ -126,17 +117,7 @@ fn lamps_behind_walls_are_rarely_sampled() {
 fn what_is_learnt_changes_the_noise_alone() {
     let grey = build(rooms(0.6));
     learnt(&grey);
-    for method in [Method::Path, Method::Bdpt, Method::Vcm] {
-        let of = |seed| Settings { method, ..settings(6, seed) };
-        let means = |render: &dyn Fn(u64) -> Rendered| (0..16).map(|seed| mean(&render(seed))).collect::<Vec<f64>>();
-        let learnt = mean_and_error(&means(&|seed| render(&grey, method, SIZE, &of(seed))));
-        let plain = mean_and_error(&means(&|seed| render_plain(&grey, &of(100 + seed))));
-        let error = learnt.1.hypot(plain.1);
-        println!("{method:?}: {learnt:?} {plain:?}");
-        // Two-sided 5 sigma of 30 degrees of freedom, three times: one false alarm in 10,000 seeds.
-        assert!((learnt.0 - plain.0).abs() < 5.0 * error, "{method:?}: {learnt:?} {plain:?}");
-        assert!(5.0 * error < 0.2 * plain.0, "{method:?}: the comparison is too noisy");
-    }
+    keeps_the_mean(&grey, 6, 0.2);
 }
 
 /// One lamp leaves nothing to choose, and lamps that all arrive nothing to learn: the picture keeps its bytes.
