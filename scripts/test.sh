@@ -134,13 +134,13 @@ if [ "$verdict" != ok ]; then
     exit 1
 fi
 wait "$fetched"
-# other_blenders [VARIABLE=VALUE]: the exporter in the oldest and the newest Blender
+# other_blenders TEST...: tests of the exporter in the oldest and the newest Blender
 other_blenders() {
     local which python
     for which in oldest newest; do
         python=.venv-bpy-$which/bin/python
         if [ -x "$python" ]; then
-            tests "Python, $which Blender" env "$@" "$python" tests/python/timed.py blender_torture blender_broken blender_export blender_motion blender_addon_wheel
+            tests "Python, $which Blender" "$python" tests/python/timed.py "$@"
         else
             without "Python, $which Blender" 'it needs Python 3.11'
         fi
@@ -149,7 +149,7 @@ other_blenders() {
 program_tests() {
     tests 'Python' .venv/bin/python tests/python/timed.py discover -s tests/python -p 'test_*.py'
     tests 'Python with Blender' .venv-bpy/bin/python tests/python/timed.py discover -s tests/python -p 'blender_*.py'
-    other_blenders
+    other_blenders blender_broken blender_export blender_motion blender_addon_wheel
     tests 'Python with USD' .venv-usd/bin/python tests/python/timed.py discover -s tests/python -p 'usd_*.py'
     if [ -x .venv-train/bin/python ]; then
         tests 'Python with PyTorch' .venv-train/bin/python tests/python/timed.py discover -s tests/python -p 'training_*.py'
@@ -191,7 +191,8 @@ fi
 if [ "$SECONDS" -lt "$long_within" ]; then
     tests 'cargo test, long' "${rust[@]}" --ignored
     tests 'Python, long' .venv-bpy/bin/python tests/python/timed.py discover -s tests/python -p 'long_blender_*.py'
-    other_blenders CAUSTIQUE_LONG=1
+    # Comparisons of all features with Cycles.
+    CAUSTIQUE_LONG=1 other_blenders blender_torture
     # Clippy's lint `incompatible_msrv` already names newer functions of the standard library.
     oldest=$(sed -n 's/^rust-version *= *"\([0-9.]*\)".*/\1/p' Cargo.toml | head -n 1)
     if cargo "+$oldest.0" --version >/dev/null 2>&1; then

@@ -18,12 +18,11 @@ const PRIOR_SAMPLES: f32 = 256.0;
 const MAX_RECEIVERS: usize = 128;
 /// Levels of the tree, which equal positions end.
 const MAX_DEPTH: u32 = 40;
-/// Largest second moment of light samples in a cell, over that without the table, for the cell to be used, and largest
-/// ratio of all together for the table to be used. A look-up takes a twentieth of the time of a path. A trial has fewer
-/// samples, which promise less.
-const MAX_CELL_RATIO: f64 = 0.8;
-const MAX_TABLE_RATIO: f64 = 0.8;
-const MAX_TRIAL_RATIO: f64 = 0.95;
+/// Largest second moment of light samples in a cell, over that without the table, for the cell to be used, and of all
+/// cells together for the table to be used. A look-up takes a twentieth of the time of a path.
+const MAX_RATIO: f64 = 0.8;
+/// The same in a trial, whose fewer samples promise less.
+const MAX_TRIAL_RATIO: f64 = 0.9;
 /// Sides that normals face: along the three axes and against them, and none.
 const SIDES: usize = 7;
 /// Index of a cell that is not used.
@@ -178,6 +177,8 @@ struct Builder<'a, const ROWS: usize, const COLUMNS: usize> {
     samples: &'a LightSamples,
     /// Probability of each bin, if nothing is known about the receiver.
     prior: &'a [f32],
+    /// Cells with a larger ratio of second moments are not used.
+    max_ratio: f64,
     table: LearntTable<ROWS, COLUMNS>,
     /// Sums of the expected second moments without the table and with it.
     without: f64,
@@ -188,19 +189,18 @@ impl<const ROWS: usize, const COLUMNS: usize> LearntTable<ROWS, COLUMNS> {
     /// Learns from light samples; `None` if the table would not reduce the noise. `prior`: for each bin, its probability
     /// if nothing is known about the receiver. Bins without probability are never selected.
     pub fn learn(samples: &LightSamples, prior: &[f32]) -> Option<LearntTable<ROWS, COLUMNS>> {
-        let (table, ratio) = LearntTable::build(samples, prior);
-        (ratio < MAX_TABLE_RATIO).then_some(table)
+        LearntTable::build(samples, prior, MAX_RATIO)
     }
 
     /// Whether samples of a trial promise that a table reduces the noise.
     pub fn promise(samples: &LightSamples, prior: &[f32]) -> bool {
-        LearntTable::<ROWS, COLUMNS>::build(samples, prior).1 < MAX_TRIAL_RATIO
+        LearntTable::<ROWS, COLUMNS>::build(samples, prior, MAX_TRIAL_RATIO).is_some()
     }
 
-    /// The table, and the expected second moment with it over that without.
-    fn build(samples: &LightSamples, prior: &[f32]) -> (LearntTable<ROWS, COLUMNS>, f64) {
+    /// The table; `None` if the expected second moment with it, over that without, is not below `max_ratio`.
+    fn build(samples: &LightSamples, prior: &[f32], max_ratio: f64) -> Option<LearntTable<ROWS, COLUMNS>> {
         let table = LearntTable { roots: [NONE; SIDES], nodes: Vec::new(), cells: Vec::new() };
-        let mut builder = Builder { samples, prior, table, without: 0.0, learnt: 0.0 };
+        let mut builder = Builder { samples, prior, max_ratio, table, without: 0.0, learnt: 0.0 };
         for side in 0..SIDES {
             let of_side = |&i: &u32| samples.receivers[i as usize].side == side;
             let mut order: Vec<u32> = (0..samples.receivers.len() as u32).filter(of_side).collect();
@@ -211,8 +211,7 @@ impl<const ROWS: usize, const COLUMNS: usize> LearntTable<ROWS, COLUMNS> {
                 builder.build(root, &mut order, &prior, 0);
             }
         }
-        let ratio = if builder.without > 0.0 { builder.learnt / builder.without } else { 1.0 };
-        (builder.table, ratio)
+        (builder.learnt < max_ratio * builder.without).then_some(builder.table)
     }
 
     /// The cell of a receiver; `None` where the table knows nothing.
@@ -302,7 +301,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Builder<'_, ROWS, COLUMNS> {
         }
         self.without += without;
         let [.., cell] = cells;
-        if learnt < MAX_CELL_RATIO * without {
+        if learnt < self.max_ratio * without {
             self.learnt += learnt;
             self.table.cells.push(cell);
             self.table.cells.len() as u32 - 1

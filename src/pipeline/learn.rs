@@ -2,7 +2,7 @@
 
 use crate::light::LearntLight;
 use crate::render::{Settings, TimeSpent, learn_light};
-use crate::scene::{Scene, View};
+use crate::scene::View;
 use crate::stop::Stop;
 
 /// Where light arrives in a picture.
@@ -20,15 +20,5 @@ impl Learnt {
         let mut spent = TimeSpent::default();
         let light = spent.measure(|| learn_light(view, &settings));
         Learnt { light, spent }
-    }
-
-    /// A copy of the scene that knows what was learnt; `None` if nothing was.
-    pub fn scene(&self, scene: &Scene) -> Option<Scene> {
-        (!self.light.is_empty()).then(|| scene.with_learnt(&self.light))
-    }
-
-    /// The scene with what was learnt.
-    pub fn apply(&self, scene: Scene) -> Scene {
-        self.scene(&scene).unwrap_or(scene)
     }
 }

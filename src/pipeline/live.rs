@@ -116,7 +116,7 @@ pub fn render_live(
         wait_for_next(&request.stop);
     }
     let learnt = Learnt::new(view, &checked.settings, &request.stop);
-    let lit = learnt.scene(scene);
+    let lit = scene.with_learnt(&learnt.light);
     let view = View::new(lit.as_ref().unwrap_or(scene), &checked.camera);
     let iterations = checked.settings.iterations;
     let chosen = known.unwrap_or_else(|| {

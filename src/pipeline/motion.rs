@@ -98,7 +98,7 @@ impl Motion for MovingScene<'_> {
             }
         };
         let camera = scene.camera(self.camera)?;
-        Ok((scene.with_learnt(&self.learnt), camera))
+        Ok((scene.with_learnt(&self.learnt).unwrap_or(scene), camera))
     }
 }
 

@@ -82,7 +82,7 @@ pub fn plan_picture(picture: &PictureRequest, path: &Path, loaded: &Loaded, stop
     let Loaded { scene, removed, .. } = loaded;
     let checked = check_picture(picture, path, scene)?;
     let learning = Learnt::new(View::new(scene, &checked.camera), &checked.settings, stop);
-    let learnt = learning.scene(scene);
+    let learnt = scene.with_learnt(&learning.light);
     let view = View::new(learnt.as_ref().unwrap_or(scene), &checked.camera);
     let finish = Some(DenoiserChoice::default());
     let memory = MemoryCheck { view, method: "auto", layers: &Selection::All, finish, limit: None };

@@ -129,10 +129,9 @@ impl Scene {
         build::build(description, threads)
     }
 
-    /// A copy of the scene that knows where light arrives.
-    #[must_use]
-    pub fn with_learnt(&self, learnt: &LearntLight) -> Scene {
-        Scene { lights: self.lights.clone().with_learnt(learnt), ..self.clone() }
+    /// A copy of the scene that knows where light arrives; `None` if nothing was learnt.
+    pub fn with_learnt(&self, learnt: &LearntLight) -> Option<Scene> {
+        (!learnt.is_empty()).then(|| Scene { lights: self.lights.clone().with_learnt(learnt), ..self.clone() })
     }
 
     /// A copy of the scene with other materials, medium and environment. The indices of refraction and the coatings of

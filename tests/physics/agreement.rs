@@ -125,6 +125,7 @@ fn lamp_behind_glass_in_a_varnished_room() {
 
 /// Smooth and rough glass under a large lamp, which paths can hit.
 #[test]
+#[ignore = "long"]
 fn glass_room() {
     let mut description = lit_room(matte(0.5, 0.0));
     add(&mut description, "smooth", sphere(Vec3::new(-0.45, 0.45, 0.0), 0.4, 128), glass(1.5));

@@ -395,9 +395,9 @@ fn under_water() {
     description.cameras.push(look_at(DVec3::new(0.3, 1.6, 0.8), DVec3::new(0.05, 0.1, 0.0), 40.0));
     let scene = build(description);
     let radius = 0.04;
-    let reference = by(&scene, (Method::Path, 40), radius, u32::MAX);
+    let reference = by(&scene, (Method::Path, 30), radius, u32::MAX);
     println!("under water: path {:.5}", average(&reference));
-    let methods = [(Method::Vcm, 16), (Method::Bpm, 24), (Method::Sppm, 16), (Method::Cppm, 16)];
+    let methods = [(Method::Vcm, 12), (Method::Bpm, 18), (Method::Sppm, 10), (Method::Cppm, 10)];
     agree_with("under water", &scene, &reference, &methods, (radius, u32::MAX), 0.03, 0.2);
 }
 

@@ -43,7 +43,7 @@ fn is_white(what: &str, scene: &Scene, methods: &[Method]) {
     for &method in methods {
         let means: Vec<f64> = (1..=SEEDS)
             .map(|seed| {
-                let pixels = picture(scene, &camera, method, if method == Method::Sppm { 14 } else { 3 }, seed);
+                let pixels = picture(scene, &camera, method, if method == Method::Sppm { 14 } else { 2 }, seed);
                 pixels.iter().sum::<f64>() / pixels.len() as f64
             })
             .collect();
@@ -219,9 +219,9 @@ fn look_alike(what: &str, scenes: &[Scene], methods: &[Method]) {
     let critical = t_critical(sidak(ERROR_RATE, checks), 1, SEEDS as f64 - 1.0);
     for &method in methods {
         let iterations = match method {
-            Method::Path => 20,
-            Method::Sppm => 14,
-            _ => 5,
+            Method::Path => 10,
+            Method::Sppm => 7,
+            _ => 3,
         };
         let means: Vec<(f64, f64)> = scenes.iter().map(|scene| mean_of(scene, method, iterations)).collect();
         println!("{what}, {method:?}: {means:.5?}");

@@ -75,7 +75,7 @@ fn check_furnaces(furnaces: &[(f32, f32)]) {
                 photons: 15_000,
                 initial_bandwidth: InitialBandwidth::Fixed(radius),
                 levels: Levels::new(levels),
-                iterations: Some(5),
+                iterations: Some(3),
                 ..Settings::default()
             };
             let (values, shared): (Vec<f64>, Vec<f64>) = (0..SEEDS).map(|seed| mean(&scene, &settings(seed))).unzip();

@@ -33,7 +33,7 @@ fn seen(scene: &Scene, method: Method) -> (f64, f64) {
     let settings = Settings {
         method,
         photons: 6000,
-        iterations: Some(48),
+        iterations: Some(32),
         initial_bandwidth: InitialBandwidth::Fixed(0.03),
         ..Settings::default()
     };

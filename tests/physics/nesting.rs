@@ -129,12 +129,12 @@ fn subpaths_agree_whether_a_solid_exists() {
     // Methods that do not render media that scatter.
     let of_surfaces = [Method::Pm, Method::Bpm].map(|method| (method, 0.3));
     let cases = [
-        ("fog", fog(), false, 4.0, &usual[..], 32),
-        ("wax", wax, false, 4.0, &usual, 32),
-        ("ball", fog(), true, 4.0, &usual, 32),
-        ("inside", fog(), true, 0.9, &usual, 32),
+        ("fog", fog(), false, 4.0, &usual[..], 24),
+        ("wax", wax, false, 4.0, &usual, 24),
+        ("ball", fog(), true, 4.0, &usual, 24),
+        ("inside", fog(), true, 0.9, &usual, 24),
         ("ball", fog(), true, 4.0, &others, 12),
-        ("clear", partial(0.4, 1.0, None), true, 4.0, &of_surfaces, 48),
+        ("clear", partial(0.4, 1.0, None), true, 4.0, &of_surfaces, 24),
     ];
     for (what, solid, ball, eye, methods, iterations) in cases {
         let mut description = Description::default();

@@ -78,7 +78,7 @@ fn furnace_box() {
 fn a_magnified_view_has_its_photons() {
     let scene = furnace(0.1);
     for method in [Method::Sppm, Method::Appm, Method::Cppm] {
-        let of = |seed| Settings { method, seed, photons: 1000, iterations: Some(32), ..Settings::default() };
+        let of = |seed| Settings { method, seed, photons: 1000, iterations: Some(16), ..Settings::default() };
         let own = of(0).levels.picture_level();
         let mean = |seed: u64| {
             let rendered = picture(&scene, &of(seed));

@@ -67,8 +67,7 @@ fn expected() -> f64 {
 /// The scene with what is learnt about its lamps.
 pub fn learnt(scene: &Scene) -> Scene {
     let learnt = learn_light(View::new(scene, &camera(scene)), &settings(1, 0));
-    assert!(learnt.lights.is_some(), "lamps behind walls are worth learning");
-    scene.with_learnt(&learnt)
+    scene.with_learnt(&learnt).expect("lamps behind walls are worth learning")
 }
 
 /// The floor of a room with black walls receives the form factor of its lamp, by all methods.

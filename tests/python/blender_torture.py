@@ -1,7 +1,6 @@
 """Renders features of Blender materials with Cycles and caustique: errors must not exceed docs/lab/blender-table.md.
 
-With CAUSTIQUE_LONG it renders all features that this version of Blender has, otherwise a few, and in other versions
-than 4.5 those that differ by version.
+With CAUSTIQUE_LONG it renders all features that this version of Blender has, otherwise a few.
 """
 
 import os
@@ -19,9 +18,6 @@ SHORT = (
     "principled_coat", "principled_glass_tinted", "image_alpha", "noise_roughness", "image_box", "bump",
     "group_of_textures", "diffuse_glossy_fresnel", "transparent_mask", "principled_mask", "leaves_clipped", "lamp_ies_uneven",
 )
-# In other versions of Blender than 4.5: inputs of Principled, images, baking by Cycles, bumps and IES profiles differ by
-# version.
-OTHER_VERSIONS = ("principled_coat", "image_alpha", "noise_roughness", "bump", "lamp_ies_uneven")
 # Cycles before Blender 4.5 turns leaning normals towards the viewer, and before 4.4 it smooths bumps: warnings say so.
 WARNED_BEFORE_4_5 = {
     "bump_mirror", "normal_map", "normal_map_weak", "normal_map_scaled", "normal_map_other_uv", "bump_over_normal_map",
@@ -54,8 +50,7 @@ class Torture(support.Scratch):
         stored, elsewhere = torture.rows(), warned_elsewhere()
         names = [name for name in torture_stage.FEATURES if exists(name)]
         self.assertGreater(len(names), 0.95 * len(torture_stage.FEATURES))
-        short = SHORT if bpy.app.version[:2] == (4, 5) else OTHER_VERSIONS
-        for name in names if os.environ.get("CAUSTIQUE_LONG") else short:
+        for name in names if os.environ.get("CAUSTIQUE_LONG") else SHORT:
             with self.subTest(name):
                 result = torture.run(name)
                 self.assertNotEqual(result.verdict, torture.WRONG, result)

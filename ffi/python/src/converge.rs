@@ -206,7 +206,7 @@ impl Comparison {
             check_settings(of, scene.path, built)?;
         }
         let learnt = Learnt::new(View::new(built, camera), &own, &callback.caller.stop());
-        let seen = learnt.scene(built);
+        let seen = built.with_learnt(&learnt.light);
         let view = View::new(seen.as_ref().unwrap_or(built), camera);
         let (entries, mut finishes) = self.entries(scene, view, settings, learnt.spent, callback)?;
         let denoisers = self.runs.iter().map(|run| (!run.options.no_finish).then_some(run.options.finish.denoise));

@@ -2,9 +2,9 @@
 kernels of both.
 
 The terms are 17 pixels of the estimate (3 x 3, and a ring of 8 at a distance of 2), 3 x 3 pixels of the denoised picture,
-its means over 5 x 5 and 13 x 13 pixels, which smooth blots, and the denoised picture plus such means of its difference
-from the estimate, which return light that the denoiser has moved. A rare bright sample says little about its pixel, so
-the terms limit the estimate to a multiple of the denoised picture.
+its means over 5 x 5, 13 x 13 and 37 x 37 pixels, which smooth blots, and the denoised picture times the ratio of such
+means of the estimate and of the denoised picture, which returns light that the denoiser has moved. A rare bright sample
+says little about its pixel, so the terms limit the estimate to a multiple of the denoised picture.
 src/finish then limits the displacement from the estimate, so the result converges with it for any weights.
 """
 
@@ -21,14 +21,15 @@ NEAR = [(y, x) for y in (-1, 0, 1) for x in (-1, 0, 1)]
 RING = [(y, x) for y in (-2, 0, 2) for x in (-2, 0, 2) if (y, x) != (0, 0)]
 OFFSETS = [NEAR + RING, NEAR]
 REACH = 2
-# Sides and steps of the windows of means: 5 x 5 pixels, and of these means 3 x 3 in steps of 4, which makes 13 x 13.
-MEANS = ((5, 1), (3, 4))
+# Sides and steps of the windows of means, each over the means of the one before: 5 x 5, 13 x 13 and 37 x 37 pixels.
+MEANS = ((5, 1), (3, 4), (3, 12))
+# Added to means before their ratio is taken, as a share of the mean of the picture, and bounds of the ratio.
+RATIO_FLOOR, RATIOS = 0.01, (0.2, 5.0)
 # Standard errors below this share of 1 + the estimate count as none.
 DEVIATION_FLOOR = 1e-3
-# Bound of the logarithms of weights, which the sums keep far from the limits of float32.
-LOG_WEIGHT_BOUND = 8.0
-# Logarithms of the initial weights of the denoised picture, and of the other terms.
-INITIAL, INITIAL_OTHERS = 3.0, -3.0
+# Weights are (x + sqrt(x^2 + 4 c)) / 2, which approaches 0 so slowly that a term that has lost its weight can regain it,
+# with this c. The initial x: the other terms together have a twentieth of the weight of the denoised picture.
+CURVATURE, INITIAL, INITIAL_OTHERS = 1e-3, 1.0, -0.5
 # Factor of the denoised picture, and share of the mean of the picture, that limit the estimate.
 BRIGHTEST = (3.0, 0.1)
 
@@ -62,7 +63,7 @@ def terms(mean, denoised):
         both = window_mean(both, side, step)
         smooth, difference = both.split(3, 1)
         yield smooth
-        yield (denoised + difference).clamp(min=0)
+        yield denoised * (1 + difference / (smooth + RATIO_FLOOR)).clamp(*RATIOS)
 
 
 def window_mean(x, side, step):
@@ -108,9 +109,8 @@ class FinishNet(nn.Module):
         for first, second in zip(self.middle[::2], self.middle[1::2]):
             x = torch.relu(x + second(torch.relu(first(x))))
         x = torch.relu(self.dec0(torch.relu(half + up(self.up(x)))))
-        logarithms = nn.functional.pixel_shuffle(self.head(x), 2)
-        # A softmax over channels is slow in ONNX Runtime.
-        return torch.exp(LOG_WEIGHT_BOUND * torch.tanh(logarithms / LOG_WEIGHT_BOUND))
+        x = nn.functional.pixel_shuffle(self.head(x), 2)
+        return (x + torch.sqrt(x * x + 4 * CURVATURE)) / 2
 
     def forward(self, x):
         groups = split(x)

@@ -2,8 +2,9 @@
 
   python -m lab.train.finish_train --data DIR --out RUN --minutes 120
 
-A repeated command with the same --out continues, as in train.py. The loss of a crop is its error over that of the
-finish without a network, so that crops of little and of much noise count alike.
+A repeated command with the same --out continues, as in train.py. The loss of a crop is the logarithm of its error over
+that of the finish without a network, so that crops of little and of much noise count alike, and none prevails that the
+network makes much worse at first.
 """
 
 import numpy as np
@@ -35,13 +36,13 @@ def crop_losses(picture, target, scale, weight):
 
 
 def loss_of(net, batch):
-    """The mean loss of the crops of a batch (input, halves, transmission), relative to the finish without a network."""
+    """The mean loss of the crops of a batch (input, halves, transmission): 0 for the finish without a network."""
     image, halves, transmission = batch
     groups, target = split(image), halves.mean(1)
     default = bounded(groups, groups["denoised"])
     scale, weight = default.mean(1).square() + 0.01, 1 + GLASS * transmission[:, 0].clamp(0, 1)
-    loss = lambda picture: crop_losses(picture, target, scale, weight)
-    return (loss(bounded(groups, net(image))) / (loss(default) + LEAST_LOSS)).mean()
+    loss = lambda picture: torch.log(crop_losses(picture, target, scale, weight) + LEAST_LOSS)
+    return (loss(bounded(groups, net(image))) - loss(default)).mean()
 
 
 @torch.no_grad()

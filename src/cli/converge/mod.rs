@@ -58,7 +58,7 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     let camera = scene.camera(&args.camera_request())?;
     let shared = runs.first().map_or_else(Settings::default, |run| run.entry.settings.clone());
     let learnt = Learnt::new(View::new(&scene, &camera), &shared, &Interrupt::stop());
-    let scene = learnt.apply(scene);
+    let scene = scene.with_learnt(&learnt.light).unwrap_or(scene);
     let view = View::new(&scene, &camera);
     let windows = windows(args, &camera)?;
     for run in &runs {

@@ -14,20 +14,23 @@ use std::sync::Arc;
 /// Number of pixels per path that learns, and bounds of the number of paths. It does not depend on the number of
 /// iterations, so that shards and resumed renders learn the same.
 const PIXELS_PER_PATH: u64 = 4;
-/// Share of the paths that a trial takes, which finds scenes where there is nothing to learn. Small pictures have none.
-const TRIAL_SHARE: u64 = 8;
 const MIN_PATHS: u64 = 1 << 10;
 const MAX_PATHS: u64 = 1 << 15;
+/// Number of paths of a trial, which finds scenes where there is nothing to learn. With fewer, a few bright samples hide
+/// what there is.
+const TRIAL_PATHS: u64 = 1 << 13;
 /// Paths per parallel task.
 const CHUNK: u64 = 256;
 
 /// Learns where light arrives in the picture of a view: first from which directions of the environment, then from which
 /// lights.
 pub fn learn_light(view: View<'_>, settings: &Settings) -> LearntLight {
-    let sky = learn_sky(view, settings).map(Arc::new);
+    // A crop window shows a part of the whole picture, to the bit.
+    let (scene, camera) = (view.scene, view.camera.uncropped());
+    let sky = learn_sky(View::new(scene, &camera), settings).map(Arc::new);
     let learnt = LearntLight { sky, lights: None };
-    let scene = (!learnt.is_empty()).then(|| view.scene.with_learnt(&learnt));
-    let lights = learn_lights(View::new(scene.as_ref().unwrap_or(view.scene), view.camera), settings);
+    let under_sky = scene.with_learnt(&learnt);
+    let lights = learn_lights(View::new(under_sky.as_ref().unwrap_or(scene), &camera), settings);
     LearntLight { lights: lights.map(Arc::new), ..learnt }
 }
 
@@ -37,27 +40,20 @@ fn learn_sky(view: View<'_>, settings: &Settings) -> Option<LearntSky> {
         return None;
     }
     let sectors = SkySectors::new(environment);
-    let samples = samples(view, settings, LightBinsOf::Sky(&sectors), |trial| sectors.promise(trial))?;
+    let samples = samples(view, settings, LightBinsOf::Sky(&sectors))?;
     LearntSky::learn(sectors, &samples)
 }
 
 fn learn_lights(view: View<'_>, settings: &Settings) -> Option<LearntLights> {
     let bins = view.scene.lights.bins()?;
-    let samples = samples(view, settings, LightBinsOf::Lights(&bins), |trial| bins.promise(trial))?;
+    let samples = samples(view, settings, LightBinsOf::Lights(&bins))?;
     LearntLights::learn(bins, &samples)
 }
 
-/// Light samples along camera paths; `None` if those of a trial do not `promise` less noise, or if the render is stopped.
-fn samples(
-    view: View<'_>,
-    settings: &Settings,
-    bins: LightBinsOf<'_>,
-    promise: impl Fn(&LightSamples) -> bool,
-) -> Option<LightSamples> {
-    let (width, height) = view.camera.uncropped().size();
-    let paths = (u64::from(width) * u64::from(height) / PIXELS_PER_PATH).clamp(MIN_PATHS, MAX_PATHS);
-    let trial = (paths / TRIAL_SHARE).max(MIN_PATHS);
-    if 2 * trial < paths && !promise(&sample(view, settings, bins, trial)?) {
+/// Light samples along camera paths; `None` if those of a trial promise nothing, or if the render is stopped.
+fn samples(view: View<'_>, settings: &Settings, bins: LightBinsOf<'_>) -> Option<LightSamples> {
+    let paths = (pixels(view.camera) / PIXELS_PER_PATH).clamp(MIN_PATHS, MAX_PATHS);
+    if 2 * TRIAL_PATHS < paths && !bins.promise(&sample(view, settings, bins, TRIAL_PATHS)?) {
         return None;
     }
     sample(view, settings, bins, paths)
@@ -70,11 +66,8 @@ fn sample(
     bins: LightBinsOf<'_>,
     paths: u64,
 ) -> Option<LightSamples> {
-    // A crop window shows a part of the whole picture, to the bit.
-    let camera: &Camera = &camera.uncropped();
     let camera_paths = settings.camera_paths(scene, camera, &InitialMedia::of(scene, camera));
-    let (width, height) = camera.size();
-    let pixels = u64::from(width) * u64::from(height);
+    let (pixels, (width, _)) = (pixels(camera), camera.size());
     let trace = |first: u64| {
         let (mut samples, mut arena) = (LightSamples::default(), Bump::new());
         for index in (first..paths.min(first + CHUNK)).take_while(|_| !camera_paths.is_stopped()) {
@@ -92,4 +85,9 @@ fn sample(
     chunks.into_par_iter().map(trace).collect_into_vec(&mut parts);
     parts.into_iter().for_each(|part| samples.append(part));
     (!camera_paths.is_stopped()).then_some(samples)
+}
+
+fn pixels(camera: &Camera) -> u64 {
+    let (width, height) = camera.size();
+    u64::from(width) * u64::from(height)
 }

@@ -24,9 +24,8 @@ pub fn render(
     settings: &Settings,
     mut observe: impl FnMut(&Progress, &[PixelAccumulator]) -> Control,
 ) -> Rendered {
-    let learnt = learn_light(View::new(scene, camera), settings);
-    let learnt = (!learnt.is_empty()).then(|| scene.with_learnt(&learnt));
-    let input = RenderInput::new(learnt.as_ref().unwrap_or(scene), camera, settings);
+    let lit = scene.with_learnt(&learn_light(View::new(scene, camera), settings));
+    let input = RenderInput::new(lit.as_ref().unwrap_or(scene), camera, settings);
     let mut session = Session::new(&input);
     let stop = run_session(&mut session, |progress, session| observe(progress, session.pixels()));
     session.finish(stop)

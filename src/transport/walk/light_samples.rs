@@ -29,6 +29,14 @@ pub enum LightBinsOf<'a> {
 }
 
 impl LightBinsOf<'_> {
+    /// Whether samples of a trial promise that it pays to learn.
+    pub fn promise(self, samples: &LightSamples) -> bool {
+        match self {
+            LightBinsOf::Sky(sky) => sky.promise(samples),
+            LightBinsOf::Lights(bins) => bins.promise(samples),
+        }
+    }
+
     /// Samples light at a receiver by uniform numbers for the choice of a light and for its point.
     fn sample(self, scene: &Scene, at: &Receiver, choice: f64, point: Vec2) -> Option<DirectSample> {
         match self {

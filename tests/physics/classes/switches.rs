@@ -189,16 +189,16 @@ fn every_class_has_the_same_light_by_every_method() {
     for effect in CLASSES {
         // Paths rarely hit the lights of caustics.
         let passes = match effect {
-            Effect::Caustic => 48,
-            Effect::Sds => 192,
-            _ => 12,
+            Effect::Caustic => 32,
+            Effect::Sds => 128,
+            _ => 8,
         };
         let paths = by(&scene, (Method::Path, Indirect::Photons), effect, passes, 0);
         assert!(average(&paths) > 1e-4, "{effect:?} is dark");
         for method in
             [(Method::Sppm, Indirect::Photons), (Method::Sppm, Indirect::Paths), (Method::Vcm, Indirect::Photons)]
         {
-            let mut others = by(&scene, method, effect, 8, 15_000);
+            let mut others = by(&scene, method, effect, 5, 15_000);
             println!("{effect:?}: paths {:.5}, {method:?} {:.5}", average(&paths), average(&others));
             let found = disagreeing(&others, &paths, critical, 0.03);
             assert!(found.is_empty() && !differ(&others, &paths), "{effect:?} {method:?}: {found:#?}");
