@@ -9,6 +9,7 @@ src/finish then limits the displacement from the estimate, so the result converg
 """
 
 import math
+from typing import NamedTuple
 
 import torch
 from torch import nn
@@ -25,6 +26,7 @@ REACH = 2
 MEANS = ((5, 1), (3, 4), (3, 12))
 # Added to means before their ratio is taken, as a share of the mean of the picture, and bounds of the ratio.
 RATIO_FLOOR, RATIOS = 0.01, (0.2, 5.0)
+LEAST_VARIANCE = 1e-8
 # Standard errors below this share of 1 + the estimate count as none.
 DEVIATION_FLOOR = 1e-3
 # Weights are (x + sqrt(x^2 + 4 c)) / 2, which approaches 0 so slowly that a term that has lost its weight can regain it,
@@ -39,43 +41,71 @@ def split(x):
     return dict(zip(PLANES, torch.split(x, list(PLANES.values()), 1)))
 
 
-def normalised(groups):
-    """The planes that the convolutions read: radiance and errors on logarithmic scales."""
+class Window(NamedTuple):
+    """Means of the denoised picture over a window, the ratio to them of means of the estimate, and the difference of
+    both [b, 1, h, w] in standard errors."""
+
+    smooth: torch.Tensor
+    ratio: torch.Tensor
+    significance: torch.Tensor
+
+
+def windows(groups, mean):
+    """The windows of MEANS around all pixels; `mean` is the limited estimate."""
+    denoised = groups["denoised"]
+    deviation = torch.minimum(groups["deviation"], limited(denoised.mean(1, keepdim=True)))
+    # Light paths that neighbours share make their noise alike: the mean of 3 x 3 pixels has more than a ninth.
+    variance = deviation.square() * (9 * groups["correlation"]).clamp(min=1)
+    means, pixels = torch.cat([denoised, mean - denoised, variance], 1), 1
+    for side, step in MEANS:
+        means, pixels = window_mean(means, side, step), pixels * side**2
+        smooth, difference, variance = means.split([3, 3, 1], 1)
+        ratio = (1 + difference / (smooth + RATIO_FLOOR)).clamp(*RATIOS)
+        error = torch.sqrt(variance / pixels + LEAST_VARIANCE)
+        yield Window(smooth, ratio, difference.mean(1, keepdim=True).abs() / error)
+
+
+def limited(denoised):
+    """The most that a pixel of the estimate counts."""
+    return BRIGHTEST[0] * denoised + BRIGHTEST[1]
+
+
+def normalised(groups, found):
+    """The planes that the convolutions read: radiance and errors on logarithmic scales, and those of the windows."""
     tone = lambda x: torch.log(1 + x)
     floor = math.log(DEVIATION_FLOOR)
     scale = 1 + groups["mean"].mean(1, keepdim=True)
     noise = lambda x: (torch.log(x / scale + DEVIATION_FLOOR) - floor) / -floor
     planes = [tone(groups["mean"]), tone(groups["denoised"]), noise(groups["deviation"]), noise(groups["reach"])]
     planes += [groups["albedo"], groups["normal"], groups["depth"] / (groups["depth"] + 1), tone(groups["effects"])]
+    for window in found:
+        planes += [torch.log(window.ratio.mean(1, keepdim=True)), tone(window.significance)]
     return torch.cat([*planes, groups["correlation"], groups["iterations"] / 8], 1)
 
 
-def terms(mean, denoised):
+def terms(mean, denoised, found):
     """The pictures [b, 3, h, w] that the weights combine, one after the other."""
-    mean = torch.minimum(mean, BRIGHTEST[0] * denoised + BRIGHTEST[1])
     height, width = mean.shape[-2:]
     for picture, offsets in zip((mean, denoised), OFFSETS):
         padded = nn.functional.pad(picture, [REACH] * 4, mode="replicate")
         for y, x in offsets:
             yield padded[..., REACH + y : REACH + y + height, REACH + x : REACH + x + width]
-    both = torch.cat([denoised, mean - denoised], 1)
-    for side, step in MEANS:
-        both = window_mean(both, side, step)
-        smooth, difference = both.split(3, 1)
-        yield smooth
-        yield denoised * (1 + difference / (smooth + RATIO_FLOOR)).clamp(*RATIOS)
+    for window in found:
+        yield window.smooth
+        yield denoised * window.ratio
 
 
 def window_mean(x, side, step):
-    """The means of six planes over side x side pixels in steps of `step`; beyond the border, its pixels repeat."""
+    """The means of seven planes over side x side pixels in steps of `step`; beyond the border, its pixels repeat."""
     # The exporter needs a constant number of channels.
-    channels, reach = 6, side // 2 * step
+    channels, reach = 7, side // 2 * step
     kernel = torch.full((channels, 1, side, side), 1 / side**2, device=x.device)
     padded = nn.functional.pad(x, [reach] * 4, mode="replicate")
     return nn.functional.conv2d(padded, kernel, dilation=step, groups=channels)
 
 
 TERMS = sum(map(len, OFFSETS)) + 2 * len(MEANS)
+INPUTS = sum(PLANES.values()) + 2 * len(MEANS)
 
 
 class FinishNet(nn.Module):
@@ -84,12 +114,12 @@ class FinishNet(nn.Module):
     output = "picture"
     stride = 4
     # Receptive radius of the layers below (a test looks for seams), rounded up to the stride.
-    halo = 32
+    halo = 52
 
     def __init__(self, half=48, quarter=64):
         super().__init__()
         self.half, self.quarter = half, quarter
-        self.stem, self.enc0 = conv(4 * sum(PLANES.values()), half), conv(half, half)
+        self.stem, self.enc0 = conv(4 * INPUTS, half), conv(half, half)
         self.down = conv(half, quarter, stride=2)
         self.middle = nn.ModuleList(conv(quarter, quarter) for _ in range(4))
         # A 1x1 convolution commutes with nearest-neighbour enlargement, so it comes first.
@@ -101,9 +131,9 @@ class FinishNet(nn.Module):
             centre = len(OFFSETS[0]) + OFFSETS[1].index((0, 0))
             self.head.bias.view(TERMS, 4)[centre] = INITIAL
 
-    def weights(self, groups):
+    def weights(self, groups, found):
         """The positive weights of all terms [b, TERMS, h, w], which need not sum to one."""
-        half = torch.relu(self.stem(nn.functional.pixel_unshuffle(normalised(groups), 2)))
+        half = torch.relu(self.stem(nn.functional.pixel_unshuffle(normalised(groups, found), 2)))
         half = torch.relu(self.enc0(half))
         x = torch.relu(self.down(half))
         for first, second in zip(self.middle[::2], self.middle[1::2]):
@@ -114,8 +144,10 @@ class FinishNet(nn.Module):
 
     def forward(self, x):
         groups = split(x)
-        weights, out = self.weights(groups), 0
-        for k, term in enumerate(terms(groups["mean"], groups["denoised"])):
+        mean = torch.minimum(groups["mean"], limited(groups["denoised"]))
+        found = list(windows(groups, mean))
+        weights, out = self.weights(groups, found), 0
+        for k, term in enumerate(terms(mean, groups["denoised"], found)):
             out = out + weights[:, k : k + 1] * term
         return out / weights.sum(1, keepdim=True)
 
