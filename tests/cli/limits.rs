@@ -238,7 +238,7 @@ fn a_memory_limit_reduces_light_paths_with_a_warning() {
 fn the_estimate_outlives_a_killed_finish() {
     let folder = Folder::new();
     let render =
-        "render scene.glb -o out.exr --width 224 --height 126 --time 2 --method path --threads 1 --progress none";
+        "render scene.glb -o out.exr --width 384 --height 216 --time 2 --method path --threads 1 --progress none";
     let is_estimate = |name: &String| name.starts_with(".caustique-out.exr-") && name.ends_with(".estimate.exr");
     let estimates = || folder.files().into_iter().filter(is_estimate).collect::<Vec<String>>();
     let mut left = 0;
@@ -252,8 +252,8 @@ fn the_estimate_outlives_a_killed_finish() {
         left += 1;
         child
     };
-    // In one process, so that the second signal comes before the end of the finish. Equal signals that come at once count
-    // as one.
+    // In one process and with a large picture, so that the second signal comes before. Equal
+    // signals that come at once count as one.
     for (signals, code) in [("kill -KILL $0", None), ("kill -INT $0 && sleep 0.005 && kill -INT $0", Some(130))] {
         let mut child = begin();
         let kill = ["-c", signals, &child.id().to_string()];
