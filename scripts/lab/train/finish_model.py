@@ -1,11 +1,12 @@
-"""The network of the finish: for each pixel, weights that sum to one over the estimate, its denoised picture, and small
-kernels of both.
+"""The network of the finish: for each pixel, weights that sum to one over the estimate, its denoised picture, and means of
+both over windows. Weights are linear in the last features, and all but that of the denoised picture start near 0: positive
+weights, such as exponentials, lose at once what is noisier on average, and then have no gradient to return.
 
-The terms are 17 pixels of the estimate (3 x 3, and a ring of 8 at a distance of 2), 3 x 3 pixels of the denoised picture,
-its means over 5 x 5, 13 x 13 and 37 x 37 pixels, which smooth blots, and the denoised picture times the ratio of such
-means of the estimate and of the denoised picture, which returns light that the denoiser has moved. A rare bright sample
-says little about its pixel, so the terms limit the estimate to a multiple of the denoised picture.
-src/finish then limits the displacement from the estimate, so the result converges with it for any weights.
+The terms are the estimate, the means of the denoised picture over 3 x 3, 9 x 9 and 45 x 45 pixels, which smooth blots, and
+the denoised picture times the ratio of such means of the estimate and of the denoised picture, which returns light that
+the denoiser has moved. A rare bright sample says little about its pixel, so the terms limit the estimate to a multiple of
+the denoised picture. src/finish then limits the displacement from the estimate, so the result converges with it for any
+weights.
 """
 
 import math
@@ -17,21 +18,13 @@ from torch import nn
 from .finish_views import PLANES
 from .model import conv, up
 
-# Offsets in y and x of the pixels of the kernels of the estimate and of the denoised picture.
-NEAR = [(y, x) for y in (-1, 0, 1) for x in (-1, 0, 1)]
-RING = [(y, x) for y in (-2, 0, 2) for x in (-2, 0, 2) if (y, x) != (0, 0)]
-OFFSETS = [NEAR + RING, NEAR]
-REACH = 2
-# Sides and steps of the windows of means, each over the means of the one before: 5 x 5, 13 x 13 and 37 x 37 pixels.
-MEANS = ((5, 1), (3, 4), (3, 12))
+# Sides and steps of the windows of means, each over the means of the one before: 3 x 3, 9 x 9 and 45 x 45 pixels.
+MEANS = ((3, 1), (3, 3), (5, 9))
 # Added to means before their ratio is taken, as a share of the mean of the picture, and bounds of the ratio.
 RATIO_FLOOR, RATIOS = 0.01, (0.2, 5.0)
 LEAST_VARIANCE = 1e-8
 # Standard errors below this share of 1 + the estimate count as none.
 DEVIATION_FLOOR = 1e-3
-# Weights are (x + sqrt(x^2 + 4 c)) / 2, which approaches 0 so slowly that a term that has lost its weight can regain it,
-# with this c. The initial x: the other terms together have a twentieth of the weight of the denoised picture.
-CURVATURE, INITIAL, INITIAL_OTHERS = 1e-3, 1.0, -0.5
 # Factor of the denoised picture, and share of the mean of the picture, that limit the estimate.
 BRIGHTEST = (3.0, 0.1)
 
@@ -84,12 +77,8 @@ def normalised(groups, found):
 
 
 def terms(mean, denoised, found):
-    """The pictures [b, 3, h, w] that the weights combine, one after the other."""
-    height, width = mean.shape[-2:]
-    for picture, offsets in zip((mean, denoised), OFFSETS):
-        padded = nn.functional.pad(picture, [REACH] * 4, mode="replicate")
-        for y, x in offsets:
-            yield padded[..., REACH + y : REACH + y + height, REACH + x : REACH + x + width]
+    """The pictures [b, 3, h, w] that the weights combine with the denoised picture, one after the other."""
+    yield mean
     for window in found:
         yield window.smooth
         yield denoised * window.ratio
@@ -104,19 +93,19 @@ def window_mean(x, side, step):
     return nn.functional.conv2d(padded, kernel, dilation=step, groups=channels)
 
 
-TERMS = sum(map(len, OFFSETS)) + 2 * len(MEANS)
+TERMS = 1 + 2 * len(MEANS)
 INPUTS = sum(PLANES.values()) + 2 * len(MEANS)
 
 
 class FinishNet(nn.Module):
-    """A U-Net at half and quarter resolution; 0.07 MFLOP per pixel. Its output is the combined picture."""
+    """A U-Net at half and quarter resolution; 0.06 MFLOP per pixel. Its output is the combined picture."""
 
     output = "picture"
     stride = 4
     # Receptive radius of the layers below (a test looks for seams), rounded up to the stride.
-    halo = 52
+    halo = 56
 
-    def __init__(self, half=48, quarter=64):
+    def __init__(self, half=40, quarter=64):
         super().__init__()
         self.half, self.quarter = half, quarter
         self.stem, self.enc0 = conv(4 * INPUTS, half), conv(half, half)
@@ -126,30 +115,28 @@ class FinishNet(nn.Module):
         self.up, self.dec0 = conv(quarter, half, 1), conv(half, half)
         self.head = conv(half, 4 * TERMS, 1)
         with torch.no_grad():
-            self.head.weight.mul_(0.1)
-            self.head.bias.fill_(INITIAL_OTHERS)
-            centre = len(OFFSETS[0]) + OFFSETS[1].index((0, 0))
-            self.head.bias.view(TERMS, 4)[centre] = INITIAL
+            self.head.weight.mul_(0.01)
+            self.head.bias.zero_()
 
     def weights(self, groups, found):
-        """The positive weights of all terms [b, TERMS, h, w], which need not sum to one."""
+        """The weights of all terms [b, TERMS, h, w]; the denoised picture has the rest of one."""
         half = torch.relu(self.stem(nn.functional.pixel_unshuffle(normalised(groups, found), 2)))
         half = torch.relu(self.enc0(half))
         x = torch.relu(self.down(half))
         for first, second in zip(self.middle[::2], self.middle[1::2]):
             x = torch.relu(x + second(torch.relu(first(x))))
         x = torch.relu(self.dec0(torch.relu(half + up(self.up(x)))))
-        x = nn.functional.pixel_shuffle(self.head(x), 2)
-        return (x + torch.sqrt(x * x + 4 * CURVATURE)) / 2
+        return nn.functional.pixel_shuffle(self.head(x), 2)
 
     def forward(self, x):
         groups = split(x)
         mean = torch.minimum(groups["mean"], limited(groups["denoised"]))
         found = list(windows(groups, mean))
-        weights, out = self.weights(groups, found), 0
-        for k, term in enumerate(terms(mean, groups["denoised"], found)):
-            out = out + weights[:, k : k + 1] * term
-        return out / weights.sum(1, keepdim=True)
+        weights, denoised = self.weights(groups, found), groups["denoised"]
+        out = denoised
+        for k, term in enumerate(terms(mean, denoised, found)):
+            out = out + weights[:, k : k + 1] * (term - denoised)
+        return out.clamp(min=0)
 
 
 def bounded(groups, picture):
