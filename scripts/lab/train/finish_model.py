@@ -3,9 +3,9 @@ both over windows. Weights are linear in the last features, and all but that of 
 weights, such as exponentials, lose at once what is noisier on average, and then have no gradient to return.
 
 The terms are the estimate, the means of the denoised picture over 3 x 3, 9 x 9 and 45 x 45 pixels, which smooth blots, and
-the denoised picture times the ratio of such means of the estimate and of the denoised picture, which returns light that
-the denoiser has moved. A rare bright sample says little about its pixel, so the terms limit the estimate to a multiple of
-the denoised picture. src/finish then limits the displacement from the estimate, so the result converges with it for any
+the denoised picture times the ratio of such means of the estimate and of the denoised picture, as far as it is
+significant, which returns light that the denoiser has moved. A rare bright sample says little about its pixel, so the
+terms limit the estimate to a multiple of the denoised picture. src/finish then limits the displacement from the estimate, so the result converges with it for any
 weights.
 """
 
@@ -23,6 +23,8 @@ MEANS = ((3, 1), (3, 3), (5, 9))
 # Added to means before their ratio is taken, as a share of the mean of the picture, and bounds of the ratio.
 RATIO_FLOOR, RATIOS = 0.01, (0.2, 5.0)
 LEAST_VARIANCE = 1e-8
+# A ratio counts by 1 - k / t^2, with t its difference from 1 in standard errors, and this k.
+NOISE = 4.0
 # Standard errors below this share of 1 + the estimate count as none.
 DEVIATION_FLOOR = 1e-3
 # Factor of the denoised picture, and share of the mean of the picture, that limit the estimate.
@@ -35,8 +37,8 @@ def split(x):
 
 
 class Window(NamedTuple):
-    """Means of the denoised picture over a window, the ratio to them of means of the estimate, and the difference of
-    both [b, 1, h, w] in standard errors."""
+    """Means of the denoised picture over a window, the significant ratio to them of means of the estimate, and the
+    difference of both [b, 1, h, w] in standard errors."""
 
     smooth: torch.Tensor
     ratio: torch.Tensor
@@ -53,9 +55,10 @@ def windows(groups, mean):
     for side, step in MEANS:
         means, pixels = window_mean(means, side, step), pixels * side**2
         smooth, difference, variance = means.split([3, 3, 1], 1)
-        ratio = (1 + difference / (smooth + RATIO_FLOOR)).clamp(*RATIOS)
-        error = torch.sqrt(variance / pixels + LEAST_VARIANCE)
-        yield Window(smooth, ratio, difference.mean(1, keepdim=True).abs() / error)
+        significance = difference.mean(1, keepdim=True).abs() / torch.sqrt(variance / pixels + LEAST_VARIANCE)
+        share = (1 - NOISE / (significance.square() + LEAST_VARIANCE)).clamp(min=0)
+        ratio = (1 + share * difference / (smooth + RATIO_FLOOR)).clamp(*RATIOS)
+        yield Window(smooth, ratio, significance)
 
 
 def limited(denoised):
