@@ -2,8 +2,8 @@
 
   python -m lab.train.finish_train --data DIR --out RUN --minutes 120
 
-A repeated command with the same --out continues, as in train.py. The loss of a crop is the logarithm of its error over
-that of the finish without a network, so that crops of little and of much noise count alike, and none prevails that the
+A repeated command with the same --out continues, as in train.py. The loss of a crop is the change of its error, over the
+error of the finish without a network, so that crops of little and of much noise count alike, and none prevails that the
 network makes much worse at first.
 """
 
@@ -11,13 +11,17 @@ import numpy as np
 import torch
 
 from . import finish_views, views
-from .evaluate import pixel_errors, trimmed_mean
 from .finish_model import FinishNet, bounded, split
 from .finish_views import VERSION
 from .train import Run, common_arguments, prepare, train
 
-# Extra weight of pixels whose first hit transmits all light; least loss of the finish without a network.
-GLASS, LEAST_LOSS = 3.0, 1e-4
+# Extra weight of pixels whose first hit transmits all light.
+GLASS = 3.0
+# Share of the pixels of a crop that count: trimmed errors leave out those with the largest errors.
+KEPT = 0.995
+# Least error of the finish without a network, and share of the noise of the target that it has at least, by which changes
+# are divided: smaller errors are not known.
+LEAST_ERROR, NOISE_SHARE = 1e-4, 0.03
 # Held-out snapshots that a validation reads.
 VALIDATED = 80
 
@@ -27,37 +31,55 @@ def rough(x):
     return x - torch.nn.functional.avg_pool2d(x, 3, 1, 1, count_include_pad=False)
 
 
-def crop_losses(picture, target, scale, weight):
-    """The loss of each crop: the relative squared errors of the picture and of its grain, compressed where they exceed
-    1, so that single pixels do not rule. `scale` [b, h, w] must not depend on the target, whose noise would then not
-    average out."""
-    errors = [difference.square().mean(1) / scale for difference in (picture - target, rough(picture - target))]
-    return sum((weight * torch.log1p(error)).mean((1, 2)) for error in errors)
+def squared_errors(picture, halves, weight, of=lambda x: x):
+    """Weighted sums of the squared errors of crops. As products of the differences to both halves of the target, they have
+    no part of its noise in the mean."""
+    return (weight * (of(picture - halves[:, 0]) * of(picture - halves[:, 1])).mean(1)).sum((1, 2))
+
+
+def grain(picture, halves, weight):
+    """The squared errors of the grain of crops."""
+    return squared_errors(picture, halves, weight, rough)
+
+
+def pixel_weights(default, halves, transmission):
+    """Weights [b, h, w] with which squared differences have relative squared errors as their sum, and the noise of the
+    target by them. Pixels have less weight where the target around them has much noise; a pixel's own noise would favour
+    targets that lack bright samples."""
+    scale, square = default.mean(1).square() + 0.01, lambda x: x.square().mean(1)
+    apart = square(halves[:, 0] - halves[:, 1])
+    noise = torch.nn.functional.avg_pool2d(apart[:, None] / 4, 15, 1, 7)
+    weight = (1 + GLASS * transmission[:, 0].clamp(0, 1)) / (scale + noise[:, 0])
+    error = (apart + square(default - halves.mean(1))) / scale
+    weight = weight * (error <= error.flatten(1).quantile(KEPT, 1)[:, None, None])
+    total = (weight * scale).sum((1, 2), keepdim=True)
+    return weight / total, (weight * noise[:, 0] / total).sum((1, 2))
 
 
 def loss_of(net, batch):
-    """The mean loss of the crops of a batch (input, halves, transmission): 0 for the finish without a network."""
+    """The mean loss of the crops of a batch (input, halves, transmission): the change of their errors over those of the
+    finish without a network, as a logarithm where it is positive."""
     image, halves, transmission = batch
-    groups, target = split(image), halves.mean(1)
+    groups = split(image)
     default = bounded(groups, groups["denoised"])
-    scale, weight = default.mean(1).square() + 0.01, 1 + GLASS * transmission[:, 0].clamp(0, 1)
-    loss = lambda picture: torch.log(crop_losses(picture, target, scale, weight) + LEAST_LOSS)
-    return (loss(bounded(groups, net(image))) - loss(default)).mean()
+    weight, noise = pixel_weights(default, halves, transmission)
+    error = lambda picture: squared_errors(picture, halves, weight) + grain(picture, halves, weight)
+    known = error(default)
+    change = (error(bounded(groups, net(image))) - known) / known.clamp(min=0).add(LEAST_ERROR + NOISE_SHARE * noise)
+    return torch.where(change < 0, change, torch.log1p(change.clamp(min=0))).mean()
 
 
 @torch.no_grad()
 def errors(net, arrays, k, device="cpu"):
-    """Trimmed errors and grain of snapshot k of a window: with the network, and without one."""
-    image, halves, _ = (torch.from_numpy(x).to(device) for x in finish_views.sample(views.snapshot(arrays, k)))
-    groups = split(image[None])
-    pictures = [bounded(groups, picture)[0] for picture in (net(image[None]), groups["denoised"])]
-    scale = halves.mean(0).mean(0).square() + 0.01
-    noise = (halves[0] - halves[1]).square().mean(0) + (pictures[1] - halves.mean(0)).square().mean(0)
-    order = (noise / scale).flatten().argsort()
-    grain = lambda picture: (rough(picture - halves[0]) * rough(picture - halves[1])).mean(0) / scale
-    return [
-        trimmed_mean(of(picture), order) for of in (lambda p: pixel_errors(p, halves), grain) for picture in pictures
-    ]
+    """Trimmed errors and grain of snapshot k of a window: with the network, and without one. They are relative to the
+    radiance of the default finish, because dividing by a noisy target would favour dark pictures."""
+    image, halves, transmission = (
+        torch.from_numpy(x).to(device)[None] for x in finish_views.sample(views.snapshot(arrays, k))
+    )
+    groups = split(image)
+    pictures = [bounded(groups, picture) for picture in (net(image), groups["denoised"])]
+    weight, _ = pixel_weights(pictures[1], halves, transmission)
+    return [error(picture, halves, weight).item() for error in (squared_errors, grain) for picture in pictures]
 
 
 def validate(net, folder, device="cpu", most=VALIDATED):
@@ -67,7 +89,8 @@ def validate(net, folder, device="cpu", most=VALIDATED):
     items = [(item, k) for item in finish_views.files(folder, True) for k in range(snapshots(item))]
     items, rows = items[:: max(1, -(-len(items) // most))], {}
     for item, k in items:
-        rows.setdefault(item[1], []).append(np.log(errors(net, finish_views.read(item), k, device)))
+        found = np.maximum(errors(net, finish_views.read(item), k, device), LEAST_ERROR)
+        rows.setdefault(item[1], []).append(np.log(found))
     net.train()
     if not rows:
         return {}
