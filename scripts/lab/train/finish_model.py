@@ -5,8 +5,8 @@ weights, such as exponentials, lose at once what is noisier on average, and then
 The terms are the estimate, the means of the denoised picture over 3 x 3, 9 x 9 and 45 x 45 pixels, which smooth blots, and
 the denoised picture times the ratio of such means of the estimate and of the denoised picture, as far as it is
 significant, which returns light that the denoiser has moved. A rare bright sample says little about its pixel, so the
-terms limit the estimate to a multiple of the denoised picture. src/finish then limits the displacement from the estimate, so the result converges with it for any
-weights.
+terms limit the estimate to a multiple of the denoised picture. src/finish then limits the displacement from the
+estimate, so the result converges with it for any weights.
 """
 
 import math

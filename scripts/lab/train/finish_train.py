@@ -11,14 +11,13 @@ import numpy as np
 import torch
 
 from . import finish_views, views
+from .evaluate import TRIMMED
 from .finish_model import FinishNet, bounded, split
 from .finish_views import VERSION
 from .train import Run, common_arguments, prepare, train
 
 # Extra weight of pixels whose first hit transmits all light.
 GLASS = 3.0
-# Share of the pixels of a crop that count: trimmed errors leave out those with the largest errors.
-KEPT = 0.995
 # Least error of the finish without a network, and share of the noise of the target that it has at least, by which changes
 # are divided: smaller errors are not known.
 LEAST_ERROR, NOISE_SHARE = 1e-4, 0.03
@@ -43,15 +42,15 @@ def grain(picture, halves, weight):
 
 
 def pixel_weights(default, halves, transmission):
-    """Weights [b, h, w] with which squared differences have relative squared errors as their sum, and the noise of the
-    target by them. Pixels have less weight where the target around them has much noise; a pixel's own noise would favour
+    """Weights [b, h, w] with which squared differences have trimmed relative squared errors as their sum, and the noise
+    of the target by them. Pixels have less weight where the target around them has much noise; a pixel's own noise would favour
     targets that lack bright samples."""
     scale, square = default.mean(1).square() + 0.01, lambda x: x.square().mean(1)
     apart = square(halves[:, 0] - halves[:, 1])
     noise = torch.nn.functional.avg_pool2d(apart[:, None] / 4, 15, 1, 7)
     weight = (1 + GLASS * transmission[:, 0].clamp(0, 1)) / (scale + noise[:, 0])
     error = (apart + square(default - halves.mean(1))) / scale
-    weight = weight * (error <= error.flatten(1).quantile(KEPT, 1)[:, None, None])
+    weight = weight * (error <= error.flatten(1).quantile(1 - TRIMMED, 1)[:, None, None])
     total = (weight * scale).sum((1, 2), keepdim=True)
     return weight / total, (weight * noise[:, 0] / total).sum((1, 2))
 
