@@ -23,10 +23,10 @@ SNAPSHOTS = (0, 2, 4)
 LEAST = 1e-6
 
 
-def pixel_errors(picture, halves):
-    """For each pixel, the mean over RGB of (x - t)(x - u) / (mean_RGB(r)^2 + 0.01), with the halves t and u of r."""
+def pixel_errors(picture, halves, scale):
+    """For each pixel, the mean over RGB of (x - t)(x - u) / scale, with the halves t and u of the target."""
     t, u = halves
-    return ((picture - t) * (picture - u)).mean(0) / ((t + u).mean(0).square() / 4 + 0.01)
+    return ((picture - t) * (picture - u)).mean(0) / scale
 
 
 def trimmed_mean(errors, order):
@@ -37,15 +37,17 @@ def trimmed_mean(errors, order):
 
 @torch.no_grad()
 def errors(net, arrays, k, device="cpu"):
-    """Trimmed errors of the combination, of Level4 and of the finished picture, for snapshot k of a stack."""
+    """Trimmed errors of the combination, of Level4 and of the finished picture, for snapshot k of a stack. They are
+    relative to the radiance of the finished picture, because dividing by a noisy target would favour dark pictures."""
     stack = views.snapshot(arrays, k, net.pairs)
     image, y, z, halves = (torch.from_numpy(x).to(device) for x in views.sample(stack, net.pairs, net.version))
     combined = combination.combine(net(image[None]), y[None], z[None], net.form)[0]
     planar = lambda picture: torch.from_numpy(picture).permute(2, 0, 1).to(device)
     usual, finished = planar(stack["levels"][3]), planar(stack["finished"])
     noise = (halves[0] - halves[1]).square().mean(0) + (usual - halves.mean(0)).square().mean(0)
-    order = (noise / (halves.mean(0).mean(0).square() + 0.01)).flatten().argsort()
-    return [trimmed_mean(pixel_errors(picture, halves), order) for picture in (combined, usual, finished)]
+    scale = finished.mean(0).square() + 0.01
+    order = (noise / scale).flatten().argsort()
+    return [trimmed_mean(pixel_errors(picture, halves, scale), order) for picture in (combined, usual, finished)]
 
 
 def evaluated(arrays):
