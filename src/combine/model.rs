@@ -73,9 +73,9 @@ impl Model {
 }
 
 /// Version of the input planes of networks of the finish. `finish/network.rs` makes the planes.
-pub const FINISH_VERSION: usize = 1;
+pub const FINISH_VERSION: usize = 2;
 /// Number of these planes.
-pub const FINISH_PLANES: usize = 24;
+pub const FINISH_PLANES: usize = 27;
 
 /// The form of a network's output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -77,7 +77,10 @@ impl Selection {
                 let any = || if is_of_lobe(name) { any_lobe() } else { any_part() };
                 let part = || finished_part(name).is_some_and(|part| chosen.wants(&part) || any());
                 let read = |kind: &LayerKind| matches!(kind.finish, Some(Use::Picture | Use::Error));
-                let of_picture = || kind_of(name).is_some_and(|(kind, finished)| !finished && read(kind));
+                let of_picture = || {
+                    let read = kind_of(name).is_some_and(|(kind, finished)| !finished && read(kind));
+                    read || part_names().any(|part| part == name)
+                };
                 chosen.wants(name) || name.is_empty() || name == MOTION || of_picture() || part()
             }
         }

@@ -2,7 +2,8 @@
 //!
 //! 1. The estimate `M`: the single-bandwidth image, or the bandwidth levels combined by equation (6) of the 2021 paper
 //!    if the user has asked for its network.
-//! 2. The picture `D` that a denoiser makes of it ([`denoiser`]), or that a network makes of both ([`network`]).
+//! 2. The picture `D` that a denoiser makes of it ([`denoiser`]) and of its additive parts, or that a network makes of
+//!    these ([`network`]).
 //! 3. `out = M + clip(D - M, -c s, c s)` ([`mod@bound`]), which is consistent for any `D`. The total light of the picture
 //!    is kept (`conserve.rs`).
 //! 4. The additive parts, finished so that they sum to the picture ([`parts`]).
@@ -47,6 +48,7 @@ use finished_error::ErrorEstimator;
 use network::{FinishNetwork, Planes};
 use parts::Part;
 use rayon::prelude::*;
+use std::array::from_fn;
 
 /// Bytes per pixel of a finish without parts, beside its layers and the memory of the denoiser: the estimates by all and
 /// by half of the iterations, their pictures, the quarters, and the buffers of the error estimate.
@@ -62,11 +64,21 @@ const LIBRARY_BYTES: u64 = 12 << 20;
 /// Address space that the library and its threads reserve and do not use. A bound found by lowering `ulimit -v`
 /// (`no_limit_of_memory_aborts` in `tests/cli/limits.rs`).
 const LIBRARY_ADDRESSES: u64 = 132 << 20;
+/// Share of the sum of the denoised parts in the picture `D`; the denoised whole has the rest. Their errors differ, because
+/// parts have less contrast in them, but parts are denoised at the lowest quality.
+const SHARE_OF_PARTS: f32 = 1.0 / 3.0;
+/// Largest share of the light by which parts that sum to the picture may differ from it.
+const PARTS_ROUNDING: f64 = 1e-5;
 /// Name of the layer with the estimated error of every pixel of the finished picture.
 pub const ERROR: &str = "Error";
 
-/// Whether finishing the picture alone, without its error and parts, reads the layer `name`.
+/// Whether finishing the picture alone, without its error and the parts that are delivered, reads the layer `name`.
 pub fn reads_for_picture(name: &str) -> bool {
+    part_names().any(|part| part == name) || reads_for_preview(name)
+}
+
+/// Whether finishing a preview reads the layer `name`.
+pub fn reads_for_preview(name: &str) -> bool {
     kind_of(name).is_some_and(|(kind, _)| kind.finish == Some(Use::Picture))
 }
 
@@ -130,6 +142,8 @@ pub struct Finished {
 
 /// A layer's name and its picture.
 type Named = (String, Picture);
+/// A layer's name and its part of the picture.
+type NamedPart = (String, Part);
 
 /// An estimate that [`Finish::deliver`] finishes.
 pub struct Prepared {
@@ -139,7 +153,9 @@ pub struct Prepared {
     half: Option<Picture>,
     /// Number of bandwidth levels that the network has combined.
     combined: Option<usize>,
-    /// The additive parts of the estimate that are finished too.
+    /// The additive parts by effect, as far as they are denoised already.
+    effects: Vec<NamedPart>,
+    /// The other additive parts of the estimate that are finished too.
     parts: Vec<Named>,
     /// The layers [`LOBE_COLORS`] of the frame.
     colors: Vec<Named>,
@@ -336,7 +352,7 @@ impl Finish {
         matches!(self.denoiser, Denoiser::Oidn { .. })
     }
 
-    /// The finished picture of an unfinished estimate, without the network.
+    /// The finished picture of an unfinished estimate, without its parts and the network.
     ///
     /// # Errors
     /// The denoiser fails.
@@ -346,19 +362,31 @@ impl Finish {
 
     /// The finished picture of an estimate whose additive parts are unknown, such as one by half of the iterations.
     fn half(&mut self, estimate: &Estimate, planes: Option<&Planes>) -> Result<Picture> {
-        let denoised = self.denoised(estimate, planes, false)?;
+        let denoised = self.denoised(estimate, &[], planes)?;
         let ([picture, _], _) = self.displaced(estimate, &denoised);
         Ok(picture)
     }
 
-    /// The picture towards which an estimate moves: the denoised one, or that of the network, which reads `planes`.
-    /// `has_parts`: whether the additive parts in `planes` are those of this estimate.
-    fn denoised(&mut self, estimate: &Estimate, planes: Option<&Planes>, has_parts: bool) -> Result<Picture> {
-        let denoised = self.denoiser.run(estimate, self.quality, self.stop.as_ref())?;
+    /// The picture towards which an estimate with these `effects`, or of unknown parts, moves: the mean of the denoised
+    /// picture and of the sum of its denoised parts, or that of the network, which reads both and `planes`.
+    fn denoised(&mut self, estimate: &Estimate, effects: &[NamedPart], planes: Option<&Planes>) -> Result<Picture> {
+        let whole = self.denoiser.run(estimate, self.quality, self.stop.as_ref())?;
+        let mean = (!effects.is_empty()).then(|| mean_with_parts(&whole, effects));
         match (&mut self.network, planes) {
-            (Some(network), Some(planes)) => network.run(planes, estimate, &denoised, has_parts),
-            _ => Ok(denoised),
+            (Some(network), Some(planes)) => network.run(planes, estimate, &whole, mean.as_ref()),
+            _ => Ok(mean.unwrap_or(whole)),
         }
+    }
+
+    /// The additive parts by effect in a layer set, denoised. None for previews, without a denoiser, and if the parts do
+    /// not sum to the estimate.
+    fn effects(&mut self, set: &LayerSet, estimate: &Estimate) -> Result<Vec<NamedPart>> {
+        if self.preview || matches!(self.denoiser, Denoiser::None) {
+            return Ok(Vec::new());
+        }
+        let parts: Vec<Named> = part_names().filter_map(|name| Some((name.into(), set.picture(name)?))).collect();
+        let rest = rest(&parts, &estimate.mean).map(f32::abs);
+        if is_light(&rest, &estimate.mean) { Ok(Vec::new()) } else { self.denoise_parts(parts, estimate) }
     }
 
     /// An estimate after its bounded displacement towards its denoised picture, the [spread](bound::spread) that limits
@@ -402,15 +430,18 @@ impl Finish {
     /// Layers are missing ([`Estimate::of`]), or the denoiser or the network fails; the set is unchanged then.
     pub fn apply(&mut self, set: &mut LayerSet, wanted: impl Fn(&str) -> bool) -> Result<Finished> {
         let names = parts_to_finish(set, &wanted);
-        self.require_memory(set, names.len())?;
+        let of_picture = part_names().filter(|name| set.get(name).is_some()).count();
+        self.require_memory(set, names.len().max(of_picture))?;
         let (estimate, planes, combined) = self.estimate(set)?;
-        let denoised = self.denoised(&estimate, planes.as_ref(), true)?;
+        let effects = self.effects(set, &estimate)?;
+        let denoised = self.denoised(&estimate, &effects, planes.as_ref())?;
         let of_half = quarters(set).map(|quarters| estimate.first_half(&quarters));
         let half = of_half.map(|of_half| self.half(&of_half, planes.as_ref())).transpose()?;
         drop(planes);
-        let parts = names.into_iter().filter_map(|name| set.picture(&name).map(|picture| (name, picture))).collect();
+        let others = names.into_iter().filter(|name| effects.iter().all(|(effect, _)| effect != name));
+        let parts = others.filter_map(|name| set.picture(&name).map(|picture| (name, picture))).collect();
         let error = ErrorSource::of(set, own_level(set));
-        let prepared = Prepared { estimate, denoised, half, combined, parts, colors: lobe_colors(set) };
+        let prepared = Prepared { estimate, denoised, half, combined, effects, parts, colors: lobe_colors(set) };
         self.deliver(prepared, error, wanted)?.insert_into(set)
     }
 
@@ -448,6 +479,7 @@ impl Finish {
         let quarters = quarters(&set);
         let motion = temporal::motion(&set)?;
         let parts = part_layers(&set).map(|layer| (layer.name.clone(), set.picture_of(layer))).collect();
+        let effects = self.effects(&set, &estimate)?;
         let correlation = temporal::correlation(set.size(), quarters.as_ref());
         // The denoiser runs without the layers in memory.
         drop(set);
@@ -455,10 +487,10 @@ impl Finish {
         if let Some(quarters) = quarters {
             let of_half = estimate.first_half(&quarters);
             drop(quarters);
-            let denoised = self.denoised(&of_half, planes.as_ref(), false)?;
+            let denoised = self.denoised(&of_half, &[], planes.as_ref())?;
             half = Some([of_half.mean, denoised]);
         }
-        let denoised = self.denoised(&estimate, planes.as_ref(), true)?;
+        let denoised = self.denoised(&estimate, &effects, planes.as_ref())?;
         let is_denoised = !matches!(self.denoiser, Denoiser::None);
         let pictures = temporal::Pictures { estimate, denoised, half, combined, is_denoised };
         Ok(temporal::Frame::new(pictures, parts, motion, correlation))
@@ -473,7 +505,7 @@ impl Finish {
         };
         let average = temporal::average(window, finish_half, parts)?;
         let temporal::Averaged { estimate, denoised, combined, half, parts } = average;
-        Some(Prepared { estimate, denoised, half, combined, parts, colors: Vec::new() })
+        Some(Prepared { estimate, denoised, half, combined, effects: Vec::new(), parts, colors: Vec::new() })
     }
 
     /// Finishes an estimate and its parts, and estimates the error. `wanted` accepts the names of layers to make.
@@ -486,13 +518,13 @@ impl Finish {
         error: Option<ErrorSource>,
         wanted: impl Fn(&str) -> bool,
     ) -> Result<FinishedPicture> {
-        let Prepared { estimate, denoised, half, combined, parts, colors } = prepared;
+        let Prepared { estimate, denoised, half, combined, effects, parts, colors } = prepared;
         let error = half.zip(error).map(|(half, source)| error_by_quarters(&source, &estimate, &half, wanted(ERROR)));
         let (error, error_map) = error.unzip();
         let ([picture, spread], clamped) = self.displaced(&estimate, &denoised);
         drop(denoised);
         let noise = self.noise(&estimate, &spread);
-        let parts = self.parts(parts, &colors, &picture, noise, wanted)?;
+        let parts = self.parts(effects, parts, &colors, &picture, noise, wanted)?;
         let account = Finished { combined, error, error_map: error_map.flatten(), clamped };
         Ok(FinishedPicture { picture, parts, account })
     }
@@ -514,6 +546,7 @@ impl Finish {
     /// the picture, or to its caustics, are all finished if one of them is wanted.
     fn parts(
         &mut self,
+        mut effects: Vec<NamedPart>,
         parts: Vec<Named>,
         colors: &[Named],
         picture: &Picture,
@@ -526,55 +559,68 @@ impl Finish {
             parts.into_iter().partition(|(name, _)| name.starts_with(CAUSTIC));
         let mut take = |names: &mut dyn Iterator<Item = &str>| -> Vec<Named> {
             let mut one = |name: &str| Some(parts.swap_remove(parts.iter().position(|(part, _)| part == name)?));
-            renamed(names.filter_map(&mut one).collect())
+            names.filter_map(&mut one).collect()
         };
-        let (effects, lobes) = (take(&mut part_names()), take(&mut lobe_names()));
-        let (groups, caustics) = (renamed(of_groups), renamed(of_caustics));
-        let any = |parts: &[Named]| parts.iter().any(|(name, _)| wanted(name));
-        let of_caustics = |(name, _): &&Named| finished_part("Caustic").as_ref() == Some(name);
-        let all_caustics = effects.iter().find(of_caustics).filter(|_| any(&caustics)).map(|(_, mean)| mean.clone());
+        let (other_effects, lobes) = (take(&mut part_names()), take(&mut lobe_names()));
+        let named = |name: &str| !name.is_empty() && finished_part(name).is_some_and(|part| wanted(&part));
+        let any = |parts: &[Named]| parts.iter().any(|(name, _)| named(name));
         let mut finished = Vec::new();
-        if any(&effects) || any(&caustics) {
-            finished.extend(self.split(effects, picture, noise, &[])?);
+        let any_effect = effects.iter().map(|(name, _)| name).chain(other_effects.iter().map(|(name, _)| name));
+        if any_effect.into_iter().any(|name| named(name)) || any(&of_caustics) {
+            effects.extend(self.denoise_parts(other_effects, noise.estimate)?);
+            let all_caustics = effects.iter().find(|(name, _)| name == "Caustic").map(|(_, part)| part.mean.clone());
+            finished.extend(split(effects, picture, noise, &[]));
+            let whole = finished.iter().find(|(name, _)| name == "Caustic").map(|(_, whole)| whole.clone());
+            if let Some((mean, whole)) = all_caustics.zip(whole).filter(|_| any(&of_caustics)) {
+                let caustics = self.denoise_parts(with_rest(of_caustics, &mean), noise.estimate)?;
+                finished.extend(split(caustics, &whole, noise, &[]));
+            }
         }
-        if any(&groups) {
-            let groups = with_rest(groups, &noise.estimate.mean);
-            finished.extend(self.split(groups, picture, noise, &[])?);
+        if any(&of_groups) {
+            let groups = self.denoise_parts(with_rest(of_groups, &noise.estimate.mean), noise.estimate)?;
+            finished.extend(split(groups, picture, noise, &[]));
         }
         // They sum to the picture only together. Other renderers have layers with some of these names.
         if lobes.len() == lobe_names().count() && any(&lobes) {
-            finished.extend(self.split(lobes, picture, noise, colors)?);
+            let lobes = self.denoise_parts(lobes, noise.estimate)?;
+            finished.extend(split(lobes, picture, noise, colors));
         }
-        let whole = all_caustics.zip(finished.iter().find(of_caustics).cloned());
-        if let Some((mean, (_, whole))) = whole {
-            let caustics = with_rest(caustics, &mean);
-            finished.extend(self.split(caustics, &whole, noise, &[])?);
-        }
-        finished.retain(|(name, _)| !name.is_empty() && wanted(name));
-        Ok(finished)
+        finished.retain(|(name, _)| named(name));
+        Ok(finished.into_iter().filter_map(|(name, part)| Some((finished_part(&name)?, part))).collect())
     }
 
-    /// Finishes named parts so that they sum to the picture `whole`, with the guides and standard errors of the whole
-    /// picture. `colors` has the colours of lobes, if the parts are those of lobes.
-    fn split(&mut self, parts: Vec<Named>, whole: &Picture, noise: Noise<'_>, colors: &[Named]) -> Result<Vec<Named>> {
-        let mut of_part = noise.estimate.clone();
-        let (mut names, mut estimates) = (Vec::with_capacity(parts.len()), Vec::with_capacity(parts.len()));
-        for (name, mean) in parts {
+    /// Denoises additive parts of an estimate with its guides and standard errors.
+    fn denoise_parts(&mut self, parts: Vec<Named>, estimate: &Estimate) -> Result<Vec<NamedPart>> {
+        let mut of_part = estimate.clone();
+        let mut denoise = |(name, mean): Named| {
             of_part.mean = mean;
             // Directly visible lights are noisy at their edges only.
-            let denoised = if of_part.mean.is_black() || ["CombinedEmission", "LobeEmit"].contains(&&*name) {
+            let denoised = if of_part.mean.is_black() || ["Emission", "Emit"].contains(&&*name) {
                 of_part.mean.clone()
             } else {
                 // Parts are looked at less closely than the picture.
                 self.denoiser.run(&of_part, Quality::Fast, self.stop.as_ref())?
             };
-            names.push(name);
-            estimates.push(Part { mean: std::mem::take(&mut of_part.mean), denoised });
-        }
-        let colors: Vec<Option<&Picture>> = names.iter().map(|name| color_of(name, colors)).collect();
-        let finished = parts::split(&estimates, whole, noise, &colors);
-        Ok(names.into_iter().zip(finished).collect())
+            Ok((name, Part { mean: std::mem::take(&mut of_part.mean), denoised }))
+        };
+        parts.into_iter().map(&mut denoise).collect()
     }
+}
+
+/// The mean, with [`SHARE_OF_PARTS`], of a denoised picture and of the sum of its denoised parts.
+fn mean_with_parts(whole: &Picture, parts: &[NamedPart]) -> Picture {
+    let sum = |index: usize, c: usize| parts.iter().map(|(_, part)| part.denoised[index][c]).sum::<f32>();
+    Picture::from_fn(whole.size(), |index| {
+        from_fn(|c| whole[index][c] + SHARE_OF_PARTS * (sum(index, c) - whole[index][c]))
+    })
+}
+
+/// Finishes parts so that they sum to the picture `whole`, whose noise is `noise`. `colors` has the colours of lobes, if
+/// the parts are those of lobes.
+fn split(parts: Vec<NamedPart>, whole: &Picture, noise: Noise<'_>, colors: &[Named]) -> Vec<Named> {
+    let (names, parts): (Vec<String>, Vec<Part>) = parts.into_iter().unzip();
+    let colors: Vec<Option<&Picture>> = names.iter().map(|name| color_of(name, colors)).collect();
+    names.into_iter().zip(parts::split(&parts, whole, noise, &colors)).collect()
 }
 
 /// A grey picture with guides.
@@ -604,24 +650,23 @@ fn error_by_quarters(
     }
 }
 
-/// Parts under the names of their finished layers.
-fn renamed(parts: Vec<Named>) -> Vec<Named> {
-    parts.into_iter().filter_map(|(name, part)| Some((finished_part(&name)?, part))).collect()
+/// A picture less its parts.
+fn rest(parts: &[Named], whole: &Picture) -> Picture {
+    let sum = |index: usize, c: usize| parts.iter().map(|(_, part)| part[index][c]).sum::<f32>();
+    Picture::from_fn(whole.size(), |index| from_fn(|c| whole[index][c] - sum(index, c)))
+}
+
+/// Whether the light in `rest` is more than rounding beside that of the picture `whole`.
+fn is_light(rest: &Picture, whole: &Picture) -> bool {
+    let sum = |light: &Picture| light.iter().flatten().map(|value| f64::from(*value)).sum::<f64>();
+    sum(rest) > PARTS_ROUNDING * sum(whole)
 }
 
 /// The light of light groups. If lights outside all groups have added any to `whole`, their light comes first, without
 /// a name; the last part takes the remainder of rounding.
 fn with_rest(mut groups: Vec<Named>, whole: &Picture) -> Vec<Named> {
-    /// Largest share of the total light that counts as rounding.
-    const ROUNDING: f64 = 1e-5;
-    let rest = Picture::from_fn(whole.size(), |index| {
-        std::array::from_fn(|c| {
-            let known: f32 = groups.iter().map(|(_, group)| group[index][c]).sum();
-            (whole[index][c] - known).max(0.0)
-        })
-    });
-    let sum = |light: &Picture| light.iter().flatten().map(|value| f64::from(*value)).sum::<f64>();
-    if sum(&rest) > ROUNDING * sum(whole) {
+    let rest = rest(&groups, whole).map(|value| value.max(0.0));
+    if is_light(&rest, whole) {
         groups.insert(0, (String::new(), rest));
     }
     groups

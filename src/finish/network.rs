@@ -1,8 +1,8 @@
-//! The network of the finish: from an estimate, its denoised picture and the noise of both it makes the picture towards
-//! which the estimate moves within its bound.
+//! The network of the finish: from an estimate, its denoised pictures and the noise of the estimate it makes the picture
+//! towards which the estimate moves within its bound.
 //!
 //! `scripts/lab/train/finish_model.py` defines the network, `finish_data.py` and `finish_views.py` its input planes; a
-//! test compares the planes that are made here. The output is a weighted mean of pixels of both pictures.
+//! test compares the planes that are made here. The output is a weighted mean of pixels of these pictures.
 
 use super::bound::{self, Noise};
 use super::estimate::{Estimate, level_count, quarters};
@@ -21,7 +21,7 @@ use std::array::from_fn;
 const LARGEST: f32 = 6e4;
 /// Additive parts of the estimate whose light the network reads, in order.
 const PARTS: [&str; 5] = ["Emission", "Direct", "Indirect", "Caustic", "Volume"];
-/// Largest ratio of the output to the sum of the brightest pixels of both pictures that rounding can produce.
+/// Largest ratio of the output to the sum of the brightest pixels of these pictures that rounding can produce.
 const ROUNDING: f32 = 1.0001;
 /// Bytes per pixel of the picture that the network takes: its input pictures, the spread and the output.
 const BYTES_PER_PIXEL: u64 = 130;
@@ -76,7 +76,8 @@ impl Planes {
 struct Input<'a> {
     planes: &'a Planes,
     estimate: &'a Estimate,
-    denoised: &'a Picture,
+    /// The picture that is denoised without the network, and the denoised whole, if that is another one.
+    denoised: [&'a Picture; 2],
     noise: Noise<'a>,
     scales: Normalisation,
     /// Whether the additive parts are those of the estimate; otherwise the network gets none.
@@ -90,7 +91,7 @@ impl Input<'_> {
         let radiance = |x: f32| stored(x * scales.exposure);
         match plane {
             0..3 => radiance(estimate.mean[i][plane]).max(0.0),
-            3..6 => radiance(self.denoised[i][plane - 3]).max(0.0),
+            3..6 => radiance(self.denoised[0][i][plane - 3]).max(0.0),
             6 => radiance((channel_mean(estimate.deviation[i].map(|error| error * error)) as f32).sqrt()),
             7..10 => {
                 let spread = spread[i][plane - 7];
@@ -104,13 +105,14 @@ impl Input<'_> {
             17..22 if self.has_parts => radiance(planes.parts[i][plane - 17]),
             17..22 => 0.0,
             22 => planes.correlation[i],
+            24..27 => radiance(self.denoised[1][i][plane - 24]).max(0.0),
             _ => (estimate.samples.unwrap_or(1).max(1) as f32).log2(),
         }
     }
 
     /// The input planes of the pixels of a rectangle.
     fn fill(&self, rect: Rect) -> Vec<f32> {
-        tensor::rows(self.denoised.size(), FINISH_PLANES, rect, |plane, start, out| {
+        tensor::rows(self.estimate.mean.size(), FINISH_PLANES, rect, |plane, start, out| {
             out.iter_mut().enumerate().for_each(|(x, out)| *out = self.value(plane, start + x));
         })
     }
@@ -118,10 +120,10 @@ impl Input<'_> {
     /// The largest output that weights, which sum to one, can give.
     fn brightest(&self) -> f32 {
         let of = |planes: std::ops::Range<usize>| {
-            let values = planes.flat_map(|plane| (0..self.denoised.len()).map(move |i| self.value(plane, i)));
+            let values = planes.flat_map(|plane| (0..self.estimate.mean.len()).map(move |i| self.value(plane, i)));
             values.fold(0.0, f32::max)
         };
-        ROUNDING * (of(0..3) + of(3..6))
+        ROUNDING * (of(0..3) + of(3..6) + of(24..27))
     }
 }
 
@@ -141,9 +143,9 @@ impl FinishNetwork {
         FinishNetwork { network }
     }
 
-    /// The network's picture of an estimate, whose denoised picture is `denoised`. `has_parts`: whether the additive
-    /// parts in `planes` are those of this estimate. The denoised picture stays where the output is no possible picture,
-    /// and where it is itself too bright to be read.
+    /// The network's picture of an estimate, whose denoised picture is `whole`. `mean`: its mean with the denoised parts,
+    /// if the additive parts in `planes` are those of this estimate. The denoised picture stays where the output is no
+    /// possible picture, and where it is itself too bright to be read.
     ///
     /// # Errors
     /// [`ErrorKind::Model`]: the network fails.
@@ -151,11 +153,11 @@ impl FinishNetwork {
         &mut self,
         planes: &Planes,
         estimate: &Estimate,
-        denoised: &Picture,
-        has_parts: bool,
+        whole: &Picture,
+        mean: Option<&Picture>,
     ) -> Result<Picture> {
         let pixels = self.network.metadata().tile_pixels();
-        self.run_tiled(planes, estimate, denoised, has_parts, pixels)
+        self.run_tiled(planes, estimate, whole, mean, pixels)
     }
 
     /// [`run`](Self::run) in tiles of about `pixels` pixels; their size changes the result by rounding only.
@@ -163,20 +165,23 @@ impl FinishNetwork {
         &mut self,
         planes: &Planes,
         estimate: &Estimate,
-        denoised: &Picture,
-        has_parts: bool,
+        whole: &Picture,
+        mean: Option<&Picture>,
         pixels: usize,
     ) -> Result<Picture> {
-        if denoised.is_empty() {
-            return Ok(denoised.clone());
+        if whole.is_empty() {
+            return Ok(whole.clone());
         }
         let spread = bound::spread(estimate);
         let noise = Noise::new(estimate, &spread);
         // The network was trained with pictures of --denoise full.
         let free = Noise { limit: f32::INFINITY, ..noise };
-        let (denoised, _) = conserve::bounded(&estimate.mean, denoised, free);
+        let full = |denoised: &Picture| conserve::bounded(&estimate.mean, denoised, free).0;
+        let (whole, mean) = (full(whole), mean.map(full));
+        let denoised = mean.as_ref().unwrap_or(&whole);
         let scales = Normalisation::new(Some(&estimate.mean), &planes.depth);
-        let input = Input { planes, estimate, denoised: &denoised, noise, scales, has_parts };
+        let has_parts = mean.is_some();
+        let input = Input { planes, estimate, denoised: [denoised, &whole], noise, scales, has_parts };
         let brightest = input.brightest();
         let colours = |tile: &Tile, output: NetworkOutput| {
             let Rect { x0, y0, x1, y1 } = tile.core;

@@ -51,11 +51,18 @@ impl LayerCounts {
             let layers = all.iter().filter(|name| takes(name)).filter_map(|name| describe(name));
             layers.map(|layer| layer.components.len()).sum()
         };
-        let finished: Vec<String> = all.iter().filter_map(|name| finished_part(name)).collect();
-        let parts = if finishes && finished.iter().any(|name| selection.wants(name)) { finished.len() } else { 0 };
+        let parts = if finishes { finished_parts(&all, selection) } else { 0 };
         let channels_of_error = channels(&|name| reads_for_error(name));
         LayerCounts { channels: channels(&wanted), channels_of_error, parts, motion: selection.wants(MOTION) }
     }
+}
+
+/// Number of additive parts among these layers that the finish denoises: all if it delivers any, else those that it
+/// makes the picture of.
+pub(super) fn finished_parts(layers: &[String], selection: &Selection) -> usize {
+    let finished: Vec<String> = layers.iter().filter_map(|name| finished_part(name)).collect();
+    let of_picture = part_names().filter(|part| layers.iter().any(|name| name == part)).count();
+    if finished.iter().any(|name| selection.wants(name)) { finished.len() } else { of_picture }
 }
 
 /// Checks that a render of this shape has all layers of a selection. `motion`: whether it has motion vectors.

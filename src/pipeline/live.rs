@@ -14,7 +14,7 @@ use super::memory::{MemoryCheck, MemoryLimit};
 use super::request::PictureRequest;
 use crate::error::{Error, ErrorKind, Result};
 use crate::film::{LayerSet, Selection};
-use crate::finish::{DenoiserChoice, reads_for_picture};
+use crate::finish::{DenoiserChoice, reads_for_preview};
 use crate::render::{
     Candidate, Control, Progress, RenderInput, Session, Settings, SettingsRequest, StopReason, run_session,
 };
@@ -180,7 +180,7 @@ fn run(
 /// The picture so far, finished as a preview unless `stop` ends that: the beauty layer alone.
 fn picture(session: &Session<'_>, finish: Option<&mut OpenFinish>, stop: &Stop) -> Result<LayerSet> {
     let finishes = finish.is_some();
-    let mut set = session.layers(|name| name.is_empty() || (finishes && reads_for_picture(name)))?;
+    let mut set = session.layers(|name| name.is_empty() || (finishes && reads_for_preview(name)))?;
     if let Some(finish) = finish {
         finish.apply_to_preview(&mut set, Some(stop))?;
     }

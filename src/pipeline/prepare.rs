@@ -1,13 +1,14 @@
 //! The fifth step: opens the finish and announces the render.
 
 use super::finish::{self, OpenFinish};
+use super::layers::finished_parts;
 use super::motion::few_moments;
 use super::observer::{Event, Observer};
 use super::plan::Planned;
 use super::request::Request;
 use super::slow_iteration;
 use crate::error::Result;
-use crate::film::{finished_part, output as film};
+use crate::film::output as film;
 use crate::plan::Plan;
 use crate::render::Settings;
 use crate::render::output::layer_shape;
@@ -61,8 +62,7 @@ fn open_finish(
     let mut finish = finish::open(wanted, Some(settings.levels.count))?;
     observer.event(Event::FinishOpened { missing: finish.missing.as_ref() });
     let Some(time) = settings.time else { return Ok((Some(finish), settings)) };
-    let parts = film::names(&layer_shape(&settings, scene));
-    let parts = parts.iter().filter_map(|name| finished_part(name)).filter(|part| request.layers.wants(part)).count();
+    let parts = finished_parts(&film::names(&layer_shape(&settings, scene)), &request.layers);
     let (width, height) = camera.size();
     let left = time - finish.reserve_time(time, width as usize * height as usize, parts)?;
     Ok((Some(finish), Settings { time: Some(left), ..settings }))

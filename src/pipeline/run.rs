@@ -12,7 +12,7 @@ use super::saver::Saver;
 use super::slow_iteration;
 use crate::error::{Error, ErrorKind, Result};
 use crate::files;
-use crate::finish::reads_for_picture;
+use crate::finish::reads_for_preview;
 use crate::image::exr;
 use crate::render::{Control, Progress, RenderInput, Rendered, Session, State, StopReason, TimeSpent, run_session};
 use serde_json::json;
@@ -159,7 +159,7 @@ impl BetweenIterations<'_> {
         let BetweenIterations { finish, frame, .. } = self;
         let mut spent = TimeSpent::default();
         spent.measure(|| {
-            let wanted = |name: &str| name.is_empty() || (finish.is_some() && reads_for_picture(name));
+            let wanted = |name: &str| name.is_empty() || (finish.is_some() && reads_for_preview(name));
             let picture = session.layers(wanted).and_then(|mut set| {
                 if let Some(finish) = finish {
                     finish.apply_to_preview(&mut set, None)?;

@@ -77,7 +77,7 @@ impl<'a> EntryRun<'a> {
         let mut spent = TimeSpent::default();
         let session = &mut self.session;
         let picture = spent.measure(|| {
-            // Without quarters and parts, which curves do not show.
+            // Without quarters, because curves do not show the error of each picture.
             let mut set = session.layers(|name| name.is_empty() || reads_for_picture(name))?;
             finish.apply(&mut set, |_| false)?;
             set.beauty()

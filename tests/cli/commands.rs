@@ -39,6 +39,33 @@ fn finishing_later_gives_the_picture_of_finishing_at_once() {
     assert_eq!(outcome.code, Some(1), "{}", outcome.stderr);
 }
 
+/// The picture is made of the whole estimate and of its parts, whatever layers are delivered, if the parts sum to it.
+#[test]
+fn layers_do_not_change_the_picture() {
+    let folder = Folder::new();
+    let render = "--iterations 3 --reproducible";
+    for (name, layers) in [("all.exr", "all"), ("beauty.exr", "beauty")] {
+        folder.render(&format!("-o {name} {render} --denoise own --layers {layers}"));
+    }
+    folder.render(&format!("-o raw.exr {render} --no-finish"));
+    let (raw, attributes) = exr::read(&folder.path("raw.exr")).expect("the file can be read");
+    let parts = ["Emission", "Volume", "Caustic", "Direct", "Indirect"];
+    assert!(parts.iter().filter(|part| raw.get(part).is_some()).count() > 2);
+    let finished_without = |name: &str, without: &[&str]| {
+        let layers = raw.layers.iter().filter(|layer| !without.contains(&&*layer.name)).cloned().collect();
+        let set = LayerSet { layers, ..raw.clone() };
+        let written = exr::write(&folder.path("some.exr"), &set, &attributes, exr::Options::default());
+        written.expect("it can be written");
+        let outcome = folder.run(&format!("finish some.exr -o {name} --denoise own"));
+        assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+        values(&folder.read(name).0, "")
+    };
+    let picture = values(&folder.read("all.exr").0, "");
+    assert!(picture == values(&folder.read("beauty.exr").0, "") && picture == finished_without("later.exr", &[]));
+    let whole = finished_without("whole.exr", &parts);
+    assert!(whole != picture && whole == finished_without("some_parts.exr", &["Direct"]));
+}
+
 /// A network of the finish reads pictures of one level, which it chooses. The header and `info` name it, and a stored
 /// picture is finished like a new one.
 #[test]

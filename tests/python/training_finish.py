@@ -37,7 +37,7 @@ def window(rng, side=48):
     noisy = lambda: truth + 0.2 * rng.normal(size=truth.shape)
     planar = lambda value: np.full((1, side, side), value, np.float16)
     flat = lambda value: np.full((1, side, side, 3), value, np.float16)
-    arrays = {"mean": noisy()[None], "denoised": flat(1), "reach": flat(0.6), "deviation": planar(0.2)}
+    arrays = {"mean": noisy()[None], "denoised": flat(1), "whole": flat(1.1), "reach": flat(0.6), "deviation": planar(0.2)}
     arrays |= {"effects": np.zeros((1, 5, side, side)), "albedo": flat(0.5), "normal": flat(0), "depth": planar(1)}
     arrays |= {"correlation": planar(1 / 9), "transmission": planar(0.5)}
     arrays = {key: value.astype(np.float16) for key, value in arrays.items()}
@@ -48,7 +48,7 @@ class Network(unittest.TestCase):
     def test_equal_pictures_are_returned_unchanged_and_the_bound_limits_the_result(self):
         rng, net = np.random.default_rng(2), network()
         x = image(rng)
-        x[:, :6] = 0.7
+        x[:, :6] = x[:, -3:] = 0.7
         self.assertLess((net(x) - 0.7).abs().max().item(), 1e-5)
         x = image(rng)
         groups = finish_model.split(x)
@@ -83,7 +83,7 @@ class Network(unittest.TestCase):
             export_network.export(net, str(file), "none")
             (got,) = onnx.reference.ReferenceEvaluator(str(file)).run(None, {"input": x.numpy()})
             known = {prop.key: prop.value for prop in onnx.load(file).metadata_props}
-        self.assertEqual((known["caustique.kind"], known["caustique.version"]), ("finish", "1"))
+        self.assertEqual((known["caustique.kind"], known["caustique.version"]), ("finish", "2"))
         with torch.no_grad():
             wanted = net(x).numpy()
         self.assertLess(np.abs(got - wanted).max() / np.abs(wanted).max(), 1e-5)
@@ -111,6 +111,7 @@ class Training(unittest.TestCase):
                 arrays, halves = window(rng)
                 data.write(view / finish_data.file_name("path"), arrays)
                 data.write(view / "path-target.npz", {"halves": halves})
+                data.write(view / finish_data.clean_name("path"), {"clean": halves.mean(0)})
                 files = {file.name: "" for file in view.iterdir()}
                 lines.append(json.dumps({"view": name, "held_out": held_out, "files": files}))
             (folder / "manifest.jsonl").write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -137,9 +138,9 @@ class Training(unittest.TestCase):
 
     def test_the_loss_of_the_denoised_picture_is_that_of_the_default_finish(self):
         rng = np.random.default_rng(7)
-        x, halves = image(rng), torch.from_numpy(rng.uniform(0.1, 1, (1, 2, 3, 24, 32)).astype(np.float32))
+        x, targets = image(rng), torch.from_numpy(rng.uniform(0.1, 1, (1, 3, 3, 24, 32)).astype(np.float32))
         same = lambda x: finish_model.split(x)["denoised"]
-        self.assertAlmostEqual(finish_train.loss_of(same, (x, halves, x[:, :1])).item(), 0, delta=1e-6)
+        self.assertAlmostEqual(finish_train.loss_of(same, (x, targets, x[:, :1])).item(), 0, delta=1e-6)
 
 
 if __name__ == "__main__":

@@ -4,8 +4,8 @@ input planes and the output of Rust and Python.
 python -m lab.train.finish_fixture
 
 The content of finish.f32 is little-endian float32: h, w, the number of iterations; the planes [h, w] of the channels
-CHANNELS, whose beauty is the denoised picture; the input planes of the network; and its picture [h, w, 3], in units of
-the channels.
+CHANNELS, whose beauty is the picture denoised with its parts, and Whole the one without; the input planes of the
+network; and its picture [h, w, 3], in units of the channels.
 """
 
 import numpy as np
@@ -15,7 +15,8 @@ from ..record import ROOT
 
 FOLDER = ROOT / "src" / "finish" / "testdata"
 H, W, ITERATIONS = 13, 18, 9
-COLOURS = ("", "Noisy", "Variance1", *(f"Quarter{k + 1}" for k in range(4)), "albedo", "Emission", "Direct", "Caustic")
+COLOURS = ("", "Noisy", "Variance1", *(f"Quarter{k + 1}" for k in range(4)), "albedo")
+COLOURS += ("Emission", "Direct", "Caustic", "Whole")
 CHANNELS = [f"{layer}.{c}".lstrip(".") for layer in COLOURS for c in "RGB"]
 CHANNELS += ["normal.X", "normal.Y", "normal.Z", "depth.Z", "A"]
 INPUTS = sum(finish_views.PLANES.values())
@@ -36,8 +37,9 @@ def channels(rng):
         picture[f"Noisy.{c}"][1], picture[f"Variance1.{c}"][:2] = 0, 0
         picture[f"Variance1.{c}"][3:8] *= 0.01
         picture[f"Variance1.{c}"][5, 5] = -1
-        picture[c] *= 5
-        picture[c][:2] = picture[f"Noisy.{c}"][:2]
+        for denoised in (picture[c], picture[f"Whole.{c}"]):
+            denoised *= 5
+            denoised[:2] = picture[f"Noisy.{c}"][:2]
         picture[f"Direct.{c}"][9, 9] = np.nan
     return picture
 
@@ -49,6 +51,7 @@ def planes(picture):
     note["parts"] = [part for part in finish_data.PARTS if f"{part}.R" in picture]
     arrays = {key: value[None] for key, value in finish_data.stack(picture | {"iterations": ITERATIONS}, note).items()}
     arrays |= {"iterations": np.array([ITERATIONS]), "halves": np.zeros((2, H, W, 3), np.float32)}
+    arrays["clean"] = arrays["halves"][0]
     image, _, _ = finish_views.sample(views.snapshot(arrays, 0))
     return image, note["exposure"]
 

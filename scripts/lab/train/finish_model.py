@@ -1,8 +1,8 @@
-"""The network of the finish: for each pixel, weights that sum to one over the estimate, its denoised picture, and means of
-both over windows. Weights are linear in the last features, and all but that of the denoised picture start near 0: positive
+"""The network of the finish: for each pixel, weights that sum to one over the estimate, its denoised pictures, and means of
+them over windows. Weights are linear in the last features, and all but that of the denoised picture start near 0: positive
 weights, such as exponentials, lose at once what is noisier on average, and then have no gradient to return.
 
-The terms are the estimate, the means of the denoised picture over 3 x 3, 9 x 9 and 45 x 45 pixels, which smooth blots, and
+The terms are the estimate, the estimate denoised without its parts, the means of the denoised picture over 3 x 3, 9 x 9 and 45 x 45 pixels, which smooth blots, and
 the denoised picture times the ratio of such means of the estimate and of the denoised picture, as far as it is
 significant, which returns light that the denoiser has moved. A rare bright sample says little about its pixel, so the
 terms limit the estimate to a multiple of the denoised picture. src/finish then limits the displacement from the
@@ -72,16 +72,19 @@ def normalised(groups, found):
     floor = math.log(DEVIATION_FLOOR)
     scale = 1 + groups["mean"].mean(1, keepdim=True)
     noise = lambda x: (torch.log(x / scale + DEVIATION_FLOOR) - floor) / -floor
-    planes = [tone(groups["mean"]), tone(groups["denoised"]), noise(groups["deviation"]), noise(groups["reach"])]
-    planes += [groups["albedo"], groups["normal"], groups["depth"] / (groups["depth"] + 1), tone(groups["effects"])]
+    planes = [tone(groups[name]) for name in ("mean", "denoised", "whole", "effects")]
+    planes += [noise(groups["deviation"]), noise(groups["reach"])]
+    planes += [groups["albedo"], groups["normal"], groups["depth"] / (groups["depth"] + 1)]
     for window in found:
         planes += [torch.log(window.ratio.mean(1, keepdim=True)), tone(window.significance)]
     return torch.cat([*planes, groups["correlation"], groups["iterations"] / 8], 1)
 
 
-def terms(mean, denoised, found):
+def terms(mean, groups, found):
     """The pictures [b, 3, h, w] that the weights combine with the denoised picture, one after the other."""
+    denoised = groups["denoised"]
     yield mean
+    yield groups["whole"]
     for window in found:
         yield window.smooth
         yield denoised * window.ratio
@@ -96,7 +99,7 @@ def window_mean(x, side, step):
     return nn.functional.conv2d(padded, kernel, dilation=step, groups=channels)
 
 
-TERMS = 1 + 2 * len(MEANS)
+TERMS = 2 + 2 * len(MEANS)
 INPUTS = sum(PLANES.values()) + 2 * len(MEANS)
 
 
@@ -137,7 +140,7 @@ class FinishNet(nn.Module):
         found = list(windows(groups, mean))
         weights, denoised = self.weights(groups, found), groups["denoised"]
         out = denoised
-        for k, term in enumerate(terms(mean, denoised, found)):
+        for k, term in enumerate(terms(mean, groups, found)):
             out = out + weights[:, k : k + 1] * (term - denoised)
         return out.clamp(min=0)
 

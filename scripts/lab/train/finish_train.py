@@ -56,13 +56,13 @@ def pixel_weights(default, halves, transmission):
 
 
 def loss_of(net, batch):
-    """The mean loss of the crops of a batch (input, halves, transmission): the change of their errors over those of the
+    """The mean loss of the crops of a batch (input, targets, transmission): the change of their errors over those of the
     finish without a network, as a logarithm where it is positive."""
-    image, halves, transmission = batch
-    groups = split(image)
+    image, targets, transmission = batch
+    groups, clean = split(image), targets[:, 2:].expand(-1, 2, -1, -1, -1)
     default = bounded(groups, groups["denoised"])
-    weight, noise = pixel_weights(default, halves, transmission)
-    error = lambda picture: squared_errors(picture, halves, weight) + grain(picture, halves, weight)
+    weight, noise = pixel_weights(default, targets[:, :2], transmission)
+    error = lambda picture: squared_errors(picture, clean, weight) + grain(picture, clean, weight)
     known = error(default)
     change = (error(bounded(groups, net(image))) - known) / known.clamp(min=0).add(LEAST_ERROR + NOISE_SHARE * noise)
     return torch.where(change < 0, change, torch.log1p(change.clamp(min=0))).mean()
@@ -72,10 +72,10 @@ def loss_of(net, batch):
 def errors(net, arrays, k, device="cpu"):
     """Trimmed errors and grain of snapshot k of a window: with the network, and without one. They are relative to the
     radiance of the default finish, because dividing by a noisy target would favour dark pictures."""
-    image, halves, transmission = (
+    image, targets, transmission = (
         torch.from_numpy(x).to(device)[None] for x in finish_views.sample(views.snapshot(arrays, k))
     )
-    groups = split(image)
+    groups, halves = split(image), targets[:, :2]
     pictures = [bounded(groups, picture) for picture in (net(image), groups["denoised"])]
     weight, _ = pixel_weights(pictures[1], halves, transmission)
     return [error(picture, halves, weight).item() for error in (squared_errors, grain) for picture in pictures]

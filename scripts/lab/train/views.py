@@ -12,6 +12,8 @@ from . import normalise
 from .data import PATHS, independent_file, manifest
 from .pairs import PAIRS
 
+# Arrays of a window that all of its snapshots share.
+TARGETS = ("halves", "clean")
 # Arrays without a last axis of colour or direction; others have one.
 PLANAR = ("deviations", "deviation", "pair_deviations", "radius", "depth", "effects", "correlation", "transmission")
 # Stacks of which a pool keeps the files open.
@@ -69,16 +71,15 @@ def whole(arrays):
 
 
 def snapshot(arrays, k, pairs="multi", part=None):
-    """Returns the pictures after the k-th stored number of iterations as a stack (normalise.py) of float32, with
-    `halves`; of a part of the pixels (slices of rows and
-    columns) if given."""
+    """Returns the pictures after the k-th stored number of iterations as a stack (normalise.py) of float32, with the
+    targets; of a part of the pixels (slices of rows and columns) if given."""
     rows, columns = part or whole(arrays)
     stack = {}
     for key, value in arrays.items():
         if key == "iterations":
             stack[key] = value[k]
             continue
-        value = value if key == "halves" else value[k]
+        value = value if key in TARGETS else value[k]
         pixels = (..., rows, columns) if key.removeprefix("bdpt_") in PLANAR else (..., rows, columns, slice(None))
         stack[key] = value[pixels].astype(np.float32)
     stack["depth"] = np.where(stack["depth"] >= 6e4, np.inf, stack["depth"])

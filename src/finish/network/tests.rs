@@ -12,7 +12,7 @@ const NETWORK: &[u8] = include_bytes!("../testdata/finish.onnx");
 /// Number that the network adds to its picture.
 const OFFSET: f32 = 1e-30;
 /// Layers of the fixture with their components, in order.
-const LAYERS: [(&str, &str); 13] = [
+const LAYERS: [(&str, &str); 14] = [
     ("", "RGB"),
     ("Noisy", "RGB"),
     ("Variance1", "RGB"),
@@ -24,6 +24,7 @@ const LAYERS: [(&str, &str); 13] = [
     ("Emission", "RGB"),
     ("Direct", "RGB"),
     ("Caustic", "RGB"),
+    ("Whole", "RGB"),
     ("normal", "XYZ"),
     ("depth", "Z"),
 ];
@@ -84,12 +85,13 @@ fn load(bytes: &[u8]) -> Network {
     Network::load(&model, &Runtime::find().unwrap(), rayon::current_num_threads()).unwrap()
 }
 
-/// The network's picture in tiles of about `pixels` pixels. The denoised picture is the beauty of the set.
+/// The network's picture in tiles of about `pixels` pixels. The denoised picture is the layer `Whole` of the set, its
+/// mean with the parts the beauty.
 fn output(network: Network, set: &LayerSet, has_parts: bool, pixels: usize) -> Picture {
     let estimate = Estimate::of(set).unwrap();
     let planes = Planes::of(set, &estimate).unwrap();
-    let denoised = set.beauty().unwrap();
-    FinishNetwork::new(network).run_tiled(&planes, &estimate, &denoised, has_parts, pixels).unwrap()
+    let (whole, mean) = (set.picture("Whole").unwrap(), has_parts.then(|| set.beauty().unwrap()));
+    FinishNetwork::new(network).run_tiled(&planes, &estimate, &whole, mean.as_ref(), pixels).unwrap()
 }
 
 /// Largest difference of two pictures in any channel.
@@ -105,11 +107,12 @@ fn planes_equal_those_of_the_training_code() {
     let (set, wanted, _) = fixture();
     let estimate = Estimate::of(&set).unwrap();
     let (planes, spread) = (Planes::of(&set, &estimate).unwrap(), bound::spread(&estimate));
+    let (mean, whole) = (set.beauty().unwrap(), set.picture("Whole").unwrap());
     let different = |has_parts: bool| -> Vec<usize> {
         let input = Input {
             planes: &planes,
             estimate: &estimate,
-            denoised: &set.beauty().unwrap(),
+            denoised: [&mean, &whole],
             noise: Noise::new(&estimate, &spread),
             scales: Normalisation::new(Some(&estimate.mean), &planes.depth),
             has_parts,
