@@ -154,16 +154,20 @@ class FinishData(unittest.TestCase):
         picture = self.picture(rng)
         for c in "RGB":
             picture[f"Direct.{c}"] = picture[f"Noisy.{c}"] / 2
+            picture[f"Whole.{c}"] = picture[f"Noisy.{c}"] / 4
         arrays = {key: value[None] for key, value in finish_data.stack(picture, note).items()}
         arrays |= {"iterations": np.array([4]), "halves": rng.uniform(0, 1, (2, 16, 16, 3)).astype(np.float32)}
+        arrays["clean"] = arrays["halves"].mean(0)
         stack = views.snapshot(arrays, 0)
-        image, halves, transmission = finish_views.sample(views.augment(stack, rng))
+        image, targets, transmission = finish_views.sample(views.augment(stack, rng))
         self.assertEqual(image.shape, (sum(finish_views.PLANES.values()), 16, 16))
-        self.assertEqual((halves.shape, transmission.shape), ((2, 3, 16, 16), (1, 16, 16)))
+        self.assertEqual((targets.shape, transmission.shape), ((3, 3, 16, 16), (1, 16, 16)))
+        np.testing.assert_allclose(targets[2], targets[:2].mean(0), rtol=1e-6)
         self.assertTrue(np.isfinite(image).all() and (image[:6] >= 0).all())
         image, _, _ = finish_views.sample(stack)
         groups = dict(zip(finish_views.PLANES, np.split(image, np.cumsum(list(finish_views.PLANES.values()))[:-1])))
         np.testing.assert_allclose(groups["mean"][0], 2 * picture["Noisy.R"], rtol=1e-3)
+        np.testing.assert_allclose(groups["whole"], groups["mean"] / 4, rtol=2e-3)
         np.testing.assert_allclose(groups["effects"][1], groups["mean"].mean(0) / 2, rtol=2e-3)
         self.assertTrue((groups["reach"][:, 0] > 0).any() and (groups["reach"][:, 1] == 0).all())
         self.assertEqual(groups["reach"][0, 5, 5], np.float16(data.LARGEST))

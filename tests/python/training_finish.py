@@ -37,9 +37,9 @@ def window(rng, side=48):
     noisy = lambda: truth + 0.2 * rng.normal(size=truth.shape)
     planar = lambda value: np.full((1, side, side), value, np.float16)
     flat = lambda value: np.full((1, side, side, 3), value, np.float16)
-    arrays = {"mean": noisy()[None], "denoised": flat(1), "whole": flat(1.1), "reach": flat(0.6), "deviation": planar(0.2)}
+    arrays = {"mean": noisy()[None], "denoised": flat(1), "whole": flat(1.1), "reach": flat(0.6)}
     arrays |= {"effects": np.zeros((1, 5, side, side)), "albedo": flat(0.5), "normal": flat(0), "depth": planar(1)}
-    arrays |= {"correlation": planar(1 / 9), "transmission": planar(0.5)}
+    arrays |= {"deviation": planar(0.2), "correlation": planar(1 / 9), "transmission": planar(0.5)}
     arrays = {key: value.astype(np.float16) for key, value in arrays.items()}
     return arrays | {"iterations": np.array([16])}, np.stack([noisy(), noisy()]).astype(np.float32)
 
