@@ -392,7 +392,7 @@ fn triads() -> Vec<(String, Parameters)> {
     list
 }
 
-const TRIAD_DRAWS: usize = 10_000;
+const TRIAD_DRAWS: usize = 6_000;
 
 #[test]
 fn directions_follow_their_density() {

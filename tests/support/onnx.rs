@@ -36,7 +36,7 @@ fn image(name: &str, channels: u64) -> Vec<u8> {
 fn metadata(kind: &str, others: &[(&str, &str)]) -> Vec<u8> {
     let right = [
         ("normalisation", "1"),
-        ("version", "1"),
+        ("version", "2"),
         ("kind", kind),
         ("features", "1"),
         ("levels", "2"),
@@ -59,7 +59,7 @@ fn metadata(kind: &str, others: &[(&str, &str)]) -> Vec<u8> {
 /// A network for two levels, or of the finish: one convolution with zero weights. `kind` is its contract. `others`
 /// replaces metadata, or removes it if the value is empty.
 pub fn network(kind: &str, others: &[(&str, &str)]) -> Vec<u8> {
-    with_planes(if kind == "finish" { 24 } else { 4 * 2 + 7 }, kind, others)
+    with_planes(if kind == "finish" { 27 } else { 4 * 2 + 7 }, kind, others)
 }
 
 /// A [`network`] with this number of input channels.

@@ -95,7 +95,7 @@ fn wrong_metadata_are_refused() {
     assert_eq!(read(&[("kind", "weights"), ("window", "3")]).unwrap().output_channels(), 36);
     let wide = read(&[("dilations", "1,4"), ("identities", "0,1,2,3")]).unwrap();
     assert_eq!((wide.output_channels(), wide.neighbour_radius()), (60, 36));
-    let of_finish = read(&[("kind", "finish"), ("version", "1"), ("normalisation", "")]).unwrap();
+    let of_finish = read(&[("kind", "finish"), ("version", "2"), ("normalisation", "")]).unwrap();
     assert_eq!((of_finish.levels, of_finish.output_channels(), of_finish.neighbour_radius()), (1, 3, 0));
     let refused = read(&[("kind", "weights"), ("identities", "0")]).unwrap_err();
     assert_eq!(refused, "it has dilations or identities, which need the kind features");

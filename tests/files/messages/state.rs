@@ -42,8 +42,8 @@ fn networks(said: &mut Said, folder: &Path) {
         load(what, &onnx::network("features", &[(key, value)]));
     }
     load("a network of weights with dilations", &onnx::network("weights", &[("dilations", "2")]));
-    load("a network of the finish for other planes", &onnx::network("finish", &[("version", "2")]));
-    load("a network of the finish of more planes", &onnx::with_planes(25, "finish", &[]));
+    load("a network of the finish for other planes", &onnx::network("finish", &[("version", "1")]));
+    load("a network of the finish of more planes", &onnx::with_planes(28, "finish", &[]));
     load("a network of the finish without a picture", &onnx::network("features", &[("kind", "finish")]));
     let right = onnx::network("features", &[]);
     load("a network without an input", &replaced(right, b"input", b"other"));
