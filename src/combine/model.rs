@@ -120,6 +120,8 @@ const MAX_TILE_FLOATS: usize = 32 << 20;
 const MAX_DILATIONS: usize = 4;
 /// Maximum number of pixels in a tile of the picture. The halo of a tile of this size is already relatively small.
 const MAX_TILE_PIXELS: usize = 512 * 512;
+/// The same for networks of the finish, whose input has many planes of full resolution.
+const MAX_FINISH_TILE_PIXELS: usize = 384 * 384;
 
 impl Metadata {
     /// Reads the network's metadata through `get`, which returns the value of a key without its prefix `caustique.`.
@@ -221,6 +223,9 @@ impl Metadata {
 
     /// Number of pixels of the tiles in which the network is run.
     pub(crate) fn tile_pixels(&self) -> usize {
-        (MAX_TILE_FLOATS / self.output_channels()).min(MAX_TILE_PIXELS)
+        match self.form {
+            OutputForm::Picture => MAX_FINISH_TILE_PIXELS,
+            _ => (MAX_TILE_FLOATS / self.output_channels()).min(MAX_TILE_PIXELS),
+        }
     }
 }

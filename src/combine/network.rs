@@ -1,5 +1,6 @@
 //! A network in ONNX Runtime: it is loaded, checked against its metadata, and run on tiles.
 
+use ort::ep::CPU;
 use ort::session::Session;
 use ort::session::builder::GraphOptimizationLevel;
 use ort::value::{Outlet, TensorRef, ValueType};
@@ -93,7 +94,10 @@ fn open(model: &Model, runtime: &Runtime, threads: usize) -> ort::Result<Session
         .with_optimization_level(GraphOptimizationLevel::All)?
         .with_intra_threads(threads)?
         // Idle inference threads must not spin while equation (6) needs the cores.
-        .with_intra_op_spinning(false)?;
+        .with_intra_op_spinning(false)?
+        // Tiles at the borders have other shapes; an arena keeps the memory of each.
+        .with_memory_pattern(false)?
+        .with_execution_providers([CPU::default().with_arena_allocator(false).build()])?;
     let _quiet = SilencedStderr::start();
     builder.commit_from_memory(&model.bytes)
 }

@@ -26,7 +26,7 @@ const ROUNDING: f32 = 1.0001;
 /// Bytes per pixel of the picture that the network takes: its input pictures, the spread and the output.
 const BYTES_PER_PIXEL: u64 = 130;
 /// Bytes that the network takes for a tile of the picture.
-const TILE_BYTES: u64 = 400 << 20;
+const TILE_BYTES: u64 = 200 << 20;
 
 /// Bytes that the network takes for a picture of `pixels` pixels.
 pub fn bytes(pixels: u64) -> u64 {

@@ -1,12 +1,12 @@
-"""The network of the finish: for each pixel, weights that sum to one over the estimate, its denoised pictures, and means of
-them over windows. Weights are linear in the last features, and all but that of the denoised picture start near 0: positive
-weights, such as exponentials, lose at once what is noisier on average, and then have no gradient to return.
+"""The network of the finish: for each pixel, weights that sum to one over the estimate, its denoised pictures, and means
+of them over windows. Weights are linear in the last features, and all but that of the denoised picture start near 0:
+positive weights, such as exponentials, lose at once what is noisier on average, and then have no gradient to return.
 
-The terms are the estimate, the estimate denoised without its parts, the means of the denoised picture over 3 x 3, 9 x 9 and 45 x 45 pixels, which smooth blots, and
-the denoised picture times the ratio of such means of the estimate and of the denoised picture, as far as it is
-significant, which returns light that the denoiser has moved. A rare bright sample says little about its pixel, so the
-terms limit the estimate to a multiple of the denoised picture. src/finish then limits the displacement from the
-estimate, so the result converges with it for any weights.
+The terms are the estimate, the estimate denoised without its parts, the means of the denoised picture over 3 x 3 and
+9 x 9 pixels, which smooth blots, and the denoised picture times the ratio of such means of the estimate and of the
+denoised picture, as far as it is significant, which returns light that the denoiser has moved. A rare bright sample
+says little about its pixel, so the terms limit the estimate to a multiple of the denoised picture. src/finish then
+limits the displacement from the estimate, so the result converges with it for any weights.
 """
 
 import math
@@ -18,8 +18,8 @@ from torch import nn
 from .finish_views import PLANES
 from .model import conv, up
 
-# Sides and steps of the windows of means, each over the means of the one before: 3 x 3, 9 x 9 and 45 x 45 pixels.
-MEANS = ((3, 1), (3, 3), (5, 9))
+# Sides and steps of the windows of means, each over the means of the one before: 3 x 3 and 9 x 9 pixels.
+MEANS = ((3, 1), (3, 3))
 # Added to means before their ratio is taken, as a share of the mean of the picture, and bounds of the ratio.
 RATIO_FLOOR, RATIOS = 0.01, (0.2, 5.0)
 LEAST_VARIANCE = 1e-8
@@ -104,14 +104,14 @@ INPUTS = sum(PLANES.values()) + 2 * len(MEANS)
 
 
 class FinishNet(nn.Module):
-    """A U-Net at half and quarter resolution; 0.06 MFLOP per pixel. Its output is the combined picture."""
+    """A U-Net at half and quarter resolution; 0.03 MFLOP per pixel. Its output is the combined picture."""
 
     output = "picture"
     stride = 4
     # Receptive radius of the layers below (a test looks for seams), rounded up to the stride.
-    halo = 56
+    halo = 32
 
-    def __init__(self, half=40, quarter=64):
+    def __init__(self, half=24, quarter=48):
         super().__init__()
         self.half, self.quarter = half, quarter
         self.stem, self.enc0 = conv(4 * INPUTS, half), conv(half, half)
