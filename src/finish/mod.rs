@@ -57,6 +57,8 @@ const BYTES_PER_PIXEL: u64 = 250;
 const BYTES_PER_PIXEL_WITH_PARTS: u64 = 120;
 /// Bytes per pixel of each additive part of the picture: its estimate, denoised and finished.
 const BYTES_PER_PIXEL_OF_PART: u64 = 36;
+/// Bytes per pixel of each part that the picture is made of: its estimate, and denoised.
+const BYTES_PER_PIXEL_OF_EFFECT: u64 = 24;
 /// Bytes per pixel of the error that is estimated between iterations.
 const BYTES_PER_PIXEL_OF_ERROR: u64 = 180;
 /// Bytes of the code of the denoiser's library.
@@ -64,8 +66,8 @@ const LIBRARY_BYTES: u64 = 12 << 20;
 /// Address space that the library and its threads reserve and do not use. A bound found by lowering `ulimit -v`
 /// (`no_limit_of_memory_aborts` in `tests/cli/limits.rs`).
 const LIBRARY_ADDRESSES: u64 = 132 << 20;
-/// Share of the sum of the denoised parts in the picture `D`; the denoised whole has the rest. Their errors differ, because
-/// parts have less contrast in them, but parts are denoised at the lowest quality.
+/// Share of the sum of the denoised parts in the picture `D`; the denoised whole has the rest. The errors of both differ,
+/// so their mean has less; parts, which are denoised at the lowest quality, have more than the whole.
 const SHARE_OF_PARTS: f32 = 1.0 / 3.0;
 /// Largest share of the light by which parts that sum to the picture may differ from it.
 const PARTS_ROUNDING: f64 = 1e-5;
@@ -100,8 +102,10 @@ pub fn library_bytes() -> u64 {
 /// Bytes that a finish of a picture of `pixels` pixels takes besides its layers and the library. `parts`: number of its
 /// additive parts.
 pub fn bytes(pixels: u64, parts: u64, denoiser: DenoiserChoice) -> u64 {
+    let effects = parts.min(part_names().count() as u64);
+    let of_picture = BYTES_PER_PIXEL + effects * BYTES_PER_PIXEL_OF_EFFECT;
     let with_parts = BYTES_PER_PIXEL_WITH_PARTS + parts * BYTES_PER_PIXEL_OF_PART;
-    held(pixels, denoiser) + pixels * BYTES_PER_PIXEL.max(with_parts)
+    held(pixels, denoiser) + pixels * of_picture.max(with_parts)
 }
 
 /// Bytes that the estimate of a finished picture's error takes between iterations, besides its layers and the library.
@@ -385,7 +389,7 @@ impl Finish {
             return Ok(Vec::new());
         }
         let parts: Vec<Named> = part_names().filter_map(|name| Some((name.into(), set.picture(name)?))).collect();
-        let rest = rest(&parts, &estimate.mean).map(f32::abs);
+        let rest = rest(&parts, &estimate.mean).map(|value| if value.is_finite() { value.abs() } else { 0.0 });
         if is_light(&rest, &estimate.mean) { Ok(Vec::new()) } else { self.denoise_parts(parts, estimate) }
     }
 
@@ -565,8 +569,7 @@ impl Finish {
         let named = |name: &str| !name.is_empty() && finished_part(name).is_some_and(|part| wanted(&part));
         let any = |parts: &[Named]| parts.iter().any(|(name, _)| named(name));
         let mut finished = Vec::new();
-        let any_effect = effects.iter().map(|(name, _)| name).chain(other_effects.iter().map(|(name, _)| name));
-        if any_effect.into_iter().any(|name| named(name)) || any(&of_caustics) {
+        if effects.iter().any(|(name, _)| named(name)) || any(&other_effects) || any(&of_caustics) {
             effects.extend(self.denoise_parts(other_effects, noise.estimate)?);
             let all_caustics = effects.iter().find(|(name, _)| name == "Caustic").map(|(_, part)| part.mean.clone());
             finished.extend(split(effects, picture, noise, &[]));
