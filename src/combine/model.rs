@@ -120,7 +120,7 @@ const MAX_TILE_FLOATS: usize = 32 << 20;
 const MAX_DILATIONS: usize = 4;
 /// Maximum number of pixels in a tile of the picture. The halo of a tile of this size is already relatively small.
 const MAX_TILE_PIXELS: usize = 512 * 512;
-/// The same for networks of the finish, whose input has many planes of full resolution.
+/// Maximum number of pixels in a tile for networks of the finish, which take many planes for each pixel.
 const MAX_FINISH_TILE_PIXELS: usize = 384 * 384;
 
 impl Metadata {

@@ -84,7 +84,7 @@ pub fn reads_for_preview(name: &str) -> bool {
     kind_of(name).is_some_and(|(kind, _)| kind.finish == Some(Use::Picture))
 }
 
-/// Whether finishing the picture and estimating its error by quarters reads the layer `name`.
+/// Whether estimating the error of the finished picture by quarters, which is made without parts, reads the layer `name`.
 pub fn reads_for_error(name: &str) -> bool {
     kind_of(name).is_some_and(|(kind, _)| matches!(kind.finish, Some(Use::Picture | Use::Error)))
 }

@@ -21,7 +21,7 @@ const MAX_DEPTH: u32 = 40;
 /// Largest second moment of light samples in a cell, over that without the table, for the cell to be used, and of all
 /// cells together for the table to be used. A look-up takes a twentieth of the time of a path.
 const MAX_RATIO: f64 = 0.8;
-/// The same for a trial, because its fewer samples show less of what can be gained.
+/// Largest ratio of a trial, which is larger, because few samples show less of the gain.
 const MAX_TRIAL_RATIO: f64 = 0.9;
 /// Sides that normals face: along the three axes and against them, and none.
 const SIDES: usize = 7;
