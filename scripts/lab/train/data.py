@@ -114,8 +114,9 @@ class Maker:
         self.folder, self.binary = folder, folder / "caustique"
         folder.mkdir(parents=True, exist_ok=True)
         if not self.binary.exists():
-            shutil.copy2(binary, folder / "caustique.part")
-            (folder / "caustique.part").rename(self.binary)
+            draft = folder / f"caustique.{os.getpid()}.part"
+            shutil.copy2(binary, draft)
+            draft.rename(self.binary)
             save(folder / "program.json", {"program": program(), "sha256": sha256(self.binary)})
         self.spent = 0.0
 

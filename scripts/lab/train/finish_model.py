@@ -27,6 +27,8 @@ LEAST_VARIANCE = 1e-8
 NOISE = 4.0
 # Standard errors below this share of 1 + the estimate count as none.
 DEVIATION_FLOOR = 1e-3
+# Whether training computes convolutions with bfloat16: in two thirds of the time where processors have instructions for it.
+BFLOAT16 = torch.cpu.get_capabilities().get("avx512_bf16", False)
 # Factor of the denoised picture, and share of the mean of the picture, that limit the estimate.
 BRIGHTEST = (3.0, 0.1)
 
@@ -126,13 +128,14 @@ class FinishNet(nn.Module):
 
     def weights(self, groups, found):
         """The weights of all terms [b, TERMS, h, w]; the denoised picture has the rest of one."""
-        half = torch.relu(self.stem(nn.functional.pixel_unshuffle(normalised(groups, found), 2)))
-        half = torch.relu(self.enc0(half))
-        x = torch.relu(self.down(half))
-        for first, second in zip(self.middle[::2], self.middle[1::2]):
-            x = torch.relu(x + second(torch.relu(first(x))))
-        x = torch.relu(self.dec0(torch.relu(half + up(self.up(x)))))
-        return nn.functional.pixel_shuffle(self.head(x), 2)
+        planes = nn.functional.pixel_unshuffle(normalised(groups, found), 2)
+        with torch.autocast(planes.device.type, torch.bfloat16, enabled=self.training and BFLOAT16):
+            half = torch.relu(self.enc0(torch.relu(self.stem(planes))))
+            x = torch.relu(self.down(half))
+            for first, second in zip(self.middle[::2], self.middle[1::2]):
+                x = torch.relu(x + second(torch.relu(first(x))))
+            x = self.head(torch.relu(self.dec0(torch.relu(half + up(self.up(x))))))
+        return nn.functional.pixel_shuffle(x.float(), 2)
 
     def forward(self, x):
         groups = split(x)
