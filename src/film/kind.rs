@@ -462,6 +462,11 @@ pub fn part_names() -> impl Iterator<Item = &'static str> {
     LAYERS.iter().filter(is_part).map(|kind| kind.name)
 }
 
+/// Whether the layer `name` is one of [`part_names`], of which the finish makes the picture.
+pub fn is_effect(name: &str) -> bool {
+    part_names().any(|part| part == name)
+}
+
 /// Names of the layers with the light by the lobe of the first hit, in the order in which they are finished.
 pub fn lobe_names() -> impl Iterator<Item = &'static str> {
     LOBE_LAYERS.iter().map(|(_, name)| *name)

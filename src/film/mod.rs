@@ -11,7 +11,7 @@ mod selection;
 pub use cryptomatte::ascii_json;
 pub use kind::{
     CAUSTIC, COMBINED, CRYPTOMATTES, LIGHT_GROUP, LOBE_COLORS, LayerDescription, MOTION, current_name, describe,
-    finished_part, former_name, kind_of, lobe_names, part_names,
+    finished_part, former_name, is_effect, kind_of, lobe_names, part_names,
 };
 pub use layers::{Layer, LayerSet, Plane, Role, Sample};
 pub use naming::{Naming, check_names, plain_name, take_plain_names};

@@ -1,8 +1,8 @@
 //! The layers that `--layers` selects.
 
 use super::kind::{
-    LAYERS, LOBE_COLORS, LayerKind, MOTION, Suffix, Use, current_name, describe, finished_part, kind_of, lobe_names,
-    part_names, stem,
+    LAYERS, LOBE_COLORS, LayerKind, MOTION, Suffix, Use, current_name, describe, finished_part, is_effect, kind_of,
+    lobe_names, part_names, stem,
 };
 use super::layers::{Layer, LayerSet, Sample};
 use crate::error::{Error, ErrorKind, Result};
@@ -79,7 +79,7 @@ impl Selection {
                 let read = |kind: &LayerKind| matches!(kind.finish, Some(Use::Picture | Use::Error));
                 let of_picture = || {
                     let read = kind_of(name).is_some_and(|(kind, finished)| !finished && read(kind));
-                    read || part_names().any(|part| part == name)
+                    read || is_effect(name)
                 };
                 chosen.wants(name) || name.is_empty() || name == MOTION || of_picture() || part()
             }

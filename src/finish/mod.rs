@@ -6,7 +6,7 @@
 //!    these ([`network`]).
 //! 3. `out = M + clip(D - M, -c s, c s)` ([`mod@bound`]), which is consistent for any `D`. The total light of the picture
 //!    is kept (`conserve.rs`).
-//! 4. The additive parts, finished so that they sum to the picture ([`parts`]).
+//! 4. The additive parts, finished so that they sum to the picture (`parts.rs`).
 //! 5. The error of the result, estimated from independent quarters of the iterations ([`FinishedError`]).
 //!
 //! Frames of an animation are averaged with their neighbours after step 2 ([`temporal`]).
@@ -20,7 +20,7 @@ mod estimate;
 mod finished_error;
 mod grey;
 pub mod network;
-pub mod parts;
+mod parts;
 pub mod statistical;
 pub mod temporal;
 mod window;
@@ -29,6 +29,7 @@ pub use bound::Clamped;
 pub use denoiser::{Denoiser, DenoiserChoice, Quality, held};
 pub use estimate::{Estimate, quarters};
 pub use finished_error::{DEFAULT_CONVERGENCE_RATE, ErrorMap, FinishedError};
+pub use parts::parts_to_finish;
 pub use window::{Windows, window};
 
 use crate::combine::model::OutputForm;
@@ -36,9 +37,7 @@ use crate::combine::{Combiner, LevelStack, Network};
 use crate::error::{Error, Result};
 use crate::estimator::QUARTERS;
 use crate::film::kind::{SQUARED_BIAS, Use};
-use crate::film::{
-    CAUSTIC, LIGHT_GROUP, LOBE_COLORS, Layer, LayerSet, Picture, Size, finished_part, kind_of, lobe_names, part_names,
-};
+use crate::film::{Layer, LayerSet, Picture, Size, finished_part, is_effect, kind_of, part_names};
 use crate::memory;
 use crate::stop::Stop;
 use crate::system;
@@ -46,9 +45,8 @@ use bound::Noise;
 use estimate::{alpha, estimate_layers, own_level};
 use finished_error::ErrorEstimator;
 use network::{FinishNetwork, Planes};
-use parts::Part;
+use parts::{Named, NamedPart, color_of, lobe_colors, mean_with_parts, part_layers};
 use rayon::prelude::*;
-use std::array::from_fn;
 
 /// Bytes per pixel of a finish without parts, beside its layers and the memory of the denoiser: the estimates by all and
 /// by half of the iterations, their pictures, the quarters, and the buffers of the error estimate.
@@ -66,17 +64,12 @@ const LIBRARY_BYTES: u64 = 12 << 20;
 /// Address space that the library and its threads reserve and do not use. A bound found by lowering `ulimit -v`
 /// (`no_limit_of_memory_aborts` in `tests/cli/limits.rs`).
 const LIBRARY_ADDRESSES: u64 = 132 << 20;
-/// Share of the sum of the denoised parts in the picture `D`; the denoised whole has the rest. The errors of both differ,
-/// so their mean has less; parts, which are denoised at the lowest quality, have more than the whole.
-const SHARE_OF_PARTS: f32 = 1.0 / 3.0;
-/// Largest share of the light by which parts that sum to the picture may differ from it.
-const PARTS_ROUNDING: f64 = 1e-5;
 /// Name of the layer with the estimated error of every pixel of the finished picture.
 pub const ERROR: &str = "Error";
 
 /// Whether finishing the picture alone, without its error and the parts that are delivered, reads the layer `name`.
 pub fn reads_for_picture(name: &str) -> bool {
-    part_names().any(|part| part == name) || reads_for_preview(name)
+    is_effect(name) || reads_for_preview(name)
 }
 
 /// Whether finishing a preview reads the layer `name`.
@@ -144,11 +137,6 @@ pub struct Finished {
     pub clamped: Clamped,
 }
 
-/// A layer's name and its picture.
-type Named = (String, Picture);
-/// A layer's name and its part of the picture.
-type NamedPart = (String, Part);
-
 /// An estimate that [`Finish::deliver`] finishes.
 pub struct Prepared {
     estimate: Estimate,
@@ -181,18 +169,6 @@ impl Prepared {
         }
         self
     }
-}
-
-/// The colour of the lobe that a layer, finished or not, has the light of.
-fn color_of<'c>(layer: &str, colors: &'c [Named]) -> Option<&'c Picture> {
-    let part = kind_of(layer).map_or(layer, |(kind, _)| kind.name);
-    let of_lobe = |color: &str| color.strip_suffix("Color").is_some_and(|lobe| part.starts_with(lobe));
-    colors.iter().find(|(color, _)| of_lobe(color)).map(|(_, picture)| picture)
-}
-
-/// The layers of a set with the colours of lobes.
-fn lobe_colors(set: &LayerSet) -> Vec<Named> {
-    LOBE_COLORS.iter().filter_map(|name| Some(((*name).to_owned(), set.picture(name)?))).collect()
 }
 
 /// Pictures from which [`Finish::deliver`] estimates the error of the finished picture.
@@ -271,19 +247,6 @@ impl FinishedPicture {
         }
         Ok(account)
     }
-}
-
-/// Names of the additive parts of a layer set that are finished if `wanted` accepts the names of finished parts: all or
-/// none, because parts sum to the picture.
-pub fn parts_to_finish(set: &LayerSet, wanted: impl Fn(&str) -> bool) -> Vec<String> {
-    let names: Vec<String> = part_layers(set).map(|layer| layer.name.clone()).collect();
-    let any = names.iter().filter_map(|name| finished_part(name)).any(|name| wanted(&name));
-    if any { names } else { Vec::new() }
-}
-
-/// The layers of a set that are additive parts of the estimate.
-fn part_layers(set: &LayerSet) -> impl Iterator<Item = &Layer> {
-    set.layers.iter().filter(|layer| finished_part(&layer.name).is_some())
 }
 
 impl Finish {
@@ -382,17 +345,6 @@ impl Finish {
         }
     }
 
-    /// The additive parts by effect in a layer set, denoised. None for previews, without a denoiser, and if the parts do
-    /// not sum to the estimate.
-    fn effects(&mut self, set: &LayerSet, estimate: &Estimate) -> Result<Vec<NamedPart>> {
-        if self.preview || matches!(self.denoiser, Denoiser::None) {
-            return Ok(Vec::new());
-        }
-        let parts: Vec<Named> = part_names().filter_map(|name| Some((name.into(), set.picture(name)?))).collect();
-        let rest = rest(&parts, &estimate.mean).map(|value| if value.is_finite() { value.abs() } else { 0.0 });
-        if is_light(&rest, &estimate.mean) { Ok(Vec::new()) } else { self.denoise_parts(parts, estimate) }
-    }
-
     /// An estimate after its bounded displacement towards its denoised picture, the [spread](bound::spread) that limits
     /// it, and the numbers of clamped pixels.
     fn displaced(&self, estimate: &Estimate, denoised: &Picture) -> ([Picture; 2], Clamped) {
@@ -434,7 +386,7 @@ impl Finish {
     /// Layers are missing ([`Estimate::of`]), or the denoiser or the network fails; the set is unchanged then.
     pub fn apply(&mut self, set: &mut LayerSet, wanted: impl Fn(&str) -> bool) -> Result<Finished> {
         let names = parts_to_finish(set, &wanted);
-        let of_picture = part_names().filter(|name| set.get(name).is_some()).count();
+        let of_picture = set.layers.iter().filter(|layer| is_effect(&layer.name)).count();
         self.require_memory(set, names.len().max(of_picture))?;
         let (estimate, planes, combined) = self.estimate(set)?;
         let effects = self.effects(set, &estimate)?;
@@ -545,85 +497,6 @@ impl Finish {
         let source = ErrorSource::of(set, own_level(set));
         Ok(half.zip(source).map(|(half, source)| error_by_quarters(&source, &estimate, &half, false).0))
     }
-
-    /// The finished parts of the picture whose names are wanted, with their layers' names. Parts that together sum to
-    /// the picture, or to its caustics, are all finished if one of them is wanted.
-    fn parts(
-        &mut self,
-        mut effects: Vec<NamedPart>,
-        parts: Vec<Named>,
-        colors: &[Named],
-        picture: &Picture,
-        noise: Noise<'_>,
-        wanted: impl Fn(&str) -> bool,
-    ) -> Result<Vec<Named>> {
-        let (of_groups, parts): (Vec<Named>, _) =
-            parts.into_iter().partition(|(name, _)| name.starts_with(LIGHT_GROUP));
-        let (of_caustics, mut parts): (Vec<Named>, Vec<_>) =
-            parts.into_iter().partition(|(name, _)| name.starts_with(CAUSTIC));
-        let mut take = |names: &mut dyn Iterator<Item = &str>| -> Vec<Named> {
-            let mut one = |name: &str| Some(parts.swap_remove(parts.iter().position(|(part, _)| part == name)?));
-            names.filter_map(&mut one).collect()
-        };
-        let (other_effects, lobes) = (take(&mut part_names()), take(&mut lobe_names()));
-        let named = |name: &str| !name.is_empty() && finished_part(name).is_some_and(|part| wanted(&part));
-        let any = |parts: &[Named]| parts.iter().any(|(name, _)| named(name));
-        let mut finished = Vec::new();
-        if effects.iter().any(|(name, _)| named(name)) || any(&other_effects) || any(&of_caustics) {
-            effects.extend(self.denoise_parts(other_effects, noise.estimate)?);
-            let all_caustics = effects.iter().find(|(name, _)| name == "Caustic").map(|(_, part)| part.mean.clone());
-            finished.extend(split(effects, picture, noise, &[]));
-            let whole = finished.iter().find(|(name, _)| name == "Caustic").map(|(_, whole)| whole.clone());
-            if let Some((mean, whole)) = all_caustics.zip(whole).filter(|_| any(&of_caustics)) {
-                let caustics = self.denoise_parts(with_rest(of_caustics, &mean), noise.estimate)?;
-                finished.extend(split(caustics, &whole, noise, &[]));
-            }
-        }
-        if any(&of_groups) {
-            let groups = self.denoise_parts(with_rest(of_groups, &noise.estimate.mean), noise.estimate)?;
-            finished.extend(split(groups, picture, noise, &[]));
-        }
-        // They sum to the picture only together. Other renderers have layers with some of these names.
-        if lobes.len() == lobe_names().count() && any(&lobes) {
-            let lobes = self.denoise_parts(lobes, noise.estimate)?;
-            finished.extend(split(lobes, picture, noise, colors));
-        }
-        finished.retain(|(name, _)| named(name));
-        Ok(finished.into_iter().filter_map(|(name, part)| Some((finished_part(&name)?, part))).collect())
-    }
-
-    /// Denoises additive parts of an estimate with its guides and standard errors.
-    fn denoise_parts(&mut self, parts: Vec<Named>, estimate: &Estimate) -> Result<Vec<NamedPart>> {
-        let mut of_part = estimate.clone();
-        let mut denoise = |(name, mean): Named| {
-            of_part.mean = mean;
-            // Directly visible lights are noisy at their edges only.
-            let denoised = if of_part.mean.is_black() || ["Emission", "Emit"].contains(&&*name) {
-                of_part.mean.clone()
-            } else {
-                // Parts are looked at less closely than the picture.
-                self.denoiser.run(&of_part, Quality::Fast, self.stop.as_ref())?
-            };
-            Ok((name, Part { mean: std::mem::take(&mut of_part.mean), denoised }))
-        };
-        parts.into_iter().map(&mut denoise).collect()
-    }
-}
-
-/// The mean, with [`SHARE_OF_PARTS`], of a denoised picture and of the sum of its denoised parts.
-fn mean_with_parts(whole: &Picture, parts: &[NamedPart]) -> Picture {
-    let sum = |index: usize, c: usize| parts.iter().map(|(_, part)| part.denoised[index][c]).sum::<f32>();
-    Picture::from_fn(whole.size(), |index| {
-        from_fn(|c| whole[index][c] + SHARE_OF_PARTS * (sum(index, c) - whole[index][c]))
-    })
-}
-
-/// Finishes parts so that they sum to the picture `whole`, whose noise is `noise`. `colors` has the colours of lobes, if
-/// the parts are those of lobes.
-fn split(parts: Vec<NamedPart>, whole: &Picture, noise: Noise<'_>, colors: &[Named]) -> Vec<Named> {
-    let (names, parts): (Vec<String>, Vec<Part>) = parts.into_iter().unzip();
-    let colors: Vec<Option<&Picture>> = names.iter().map(|name| color_of(name, colors)).collect();
-    names.into_iter().zip(parts::split(&parts, whole, noise, &colors)).collect()
 }
 
 /// A grey picture with guides.
@@ -651,26 +524,4 @@ fn error_by_quarters(
     } else {
         (estimator.error(), None)
     }
-}
-
-/// A picture less its parts.
-fn rest(parts: &[Named], whole: &Picture) -> Picture {
-    let sum = |index: usize, c: usize| parts.iter().map(|(_, part)| part[index][c]).sum::<f32>();
-    Picture::from_fn(whole.size(), |index| from_fn(|c| whole[index][c] - sum(index, c)))
-}
-
-/// Whether the light in `rest` is more than rounding beside that of the picture `whole`.
-fn is_light(rest: &Picture, whole: &Picture) -> bool {
-    let sum = |light: &Picture| light.iter().flatten().map(|value| f64::from(*value)).sum::<f64>();
-    sum(rest) > PARTS_ROUNDING * sum(whole)
-}
-
-/// The light of light groups. If lights outside all groups have added any to `whole`, their light comes first, without
-/// a name; the last part takes the remainder of rounding.
-fn with_rest(mut groups: Vec<Named>, whole: &Picture) -> Vec<Named> {
-    let rest = rest(&groups, whole).map(|value| value.max(0.0));
-    if is_light(&rest, whole) {
-        groups.insert(0, (String::new(), rest));
-    }
-    groups
 }

@@ -1,4 +1,4 @@
-//! Additive parts of the finished picture.
+//! Additive parts of the finished picture: which are finished, their denoised pictures, and their names.
 //!
 //! Each part is denoised and displaced within the bound of the whole picture. Then all parts are scaled by a common factor
 //! per pixel so that they sum to the finished picture. A part is never negative, and converges to the limit of its
@@ -6,15 +6,170 @@
 
 use super::bound::Noise;
 use super::conserve::bounded;
-use crate::film::Picture;
+use super::{Denoiser, Estimate, Finish, Quality};
+use crate::error::Result;
+use crate::film::{
+    CAUSTIC, LIGHT_GROUP, LOBE_COLORS, Layer, LayerSet, Picture, finished_part, kind_of, lobe_names, part_names,
+};
 use rayon::prelude::*;
+use std::array::from_fn;
+
+/// Share of the sum of the denoised parts in the picture `D`; the denoised whole has the rest. The errors of both differ,
+/// so their mean has less; parts, which are denoised at the lowest quality, have more than the whole.
+const SHARE_OF_PARTS: f32 = 1.0 / 3.0;
+/// Largest share of the light by which parts that sum to the picture may differ from it.
+const PARTS_ROUNDING: f64 = 1e-5;
 
 /// An additive part of the picture, such as its caustics, before the bound: its estimate and its denoised picture.
-pub struct Part {
+pub(super) struct Part {
     /// Estimated light of the part.
-    pub mean: Picture,
+    mean: Picture,
     /// Denoised estimate of the part; the estimate itself if it has no noise.
-    pub denoised: Picture,
+    denoised: Picture,
+}
+
+/// A layer's name and its picture.
+pub(super) type Named = (String, Picture);
+/// A layer's name and its part of the picture.
+pub(super) type NamedPart = (String, Part);
+
+/// Names of the additive parts of a layer set that are finished if `wanted` accepts the names of finished parts: all or
+/// none, because parts sum to the picture.
+pub fn parts_to_finish(set: &LayerSet, wanted: impl Fn(&str) -> bool) -> Vec<String> {
+    let names: Vec<String> = part_layers(set).map(|layer| layer.name.clone()).collect();
+    let any = names.iter().filter_map(|name| finished_part(name)).any(|name| wanted(&name));
+    if any { names } else { Vec::new() }
+}
+
+/// The layers of a set that are additive parts of the estimate.
+pub(super) fn part_layers(set: &LayerSet) -> impl Iterator<Item = &Layer> {
+    set.layers.iter().filter(|layer| finished_part(&layer.name).is_some())
+}
+
+/// The colour of the lobe that a layer, finished or not, has the light of.
+pub(super) fn color_of<'c>(layer: &str, colors: &'c [Named]) -> Option<&'c Picture> {
+    let part = kind_of(layer).map_or(layer, |(kind, _)| kind.name);
+    let of_lobe = |color: &str| color.strip_suffix("Color").is_some_and(|lobe| part.starts_with(lobe));
+    colors.iter().find(|(color, _)| of_lobe(color)).map(|(_, picture)| picture)
+}
+
+/// The layers of a set with the colours of lobes.
+pub(super) fn lobe_colors(set: &LayerSet) -> Vec<Named> {
+    LOBE_COLORS.iter().filter_map(|name| Some(((*name).to_owned(), set.picture(name)?))).collect()
+}
+
+impl Finish {
+    /// The additive parts by effect in a layer set, denoised. None for previews, without a denoiser, and if the parts do
+    /// not sum to the estimate.
+    pub(super) fn effects(&mut self, set: &LayerSet, estimate: &Estimate) -> Result<Vec<NamedPart>> {
+        if self.preview || matches!(self.denoiser, Denoiser::None) {
+            return Ok(Vec::new());
+        }
+        let parts: Vec<Named> = part_names().filter_map(|name| Some((name.into(), set.picture(name)?))).collect();
+        let rest = rest(&parts, &estimate.mean).map(|value| if value.is_finite() { value.abs() } else { 0.0 });
+        if is_light(&rest, &estimate.mean) { Ok(Vec::new()) } else { self.denoise_parts(parts, estimate) }
+    }
+
+    /// The finished parts of the picture whose names are wanted, with their layers' names. Parts that together sum to
+    /// the picture, or to its caustics, are all finished if one of them is wanted.
+    pub(super) fn parts(
+        &mut self,
+        mut effects: Vec<NamedPart>,
+        parts: Vec<Named>,
+        colors: &[Named],
+        picture: &Picture,
+        noise: Noise<'_>,
+        wanted: impl Fn(&str) -> bool,
+    ) -> Result<Vec<Named>> {
+        let (of_groups, parts): (Vec<Named>, _) =
+            parts.into_iter().partition(|(name, _)| name.starts_with(LIGHT_GROUP));
+        let (of_caustics, mut parts): (Vec<Named>, Vec<_>) =
+            parts.into_iter().partition(|(name, _)| name.starts_with(CAUSTIC));
+        let mut take = |names: &mut dyn Iterator<Item = &str>| -> Vec<Named> {
+            let mut one = |name: &str| Some(parts.swap_remove(parts.iter().position(|(part, _)| part == name)?));
+            names.filter_map(&mut one).collect()
+        };
+        let (other_effects, lobes) = (take(&mut part_names()), take(&mut lobe_names()));
+        let named = |name: &str| !name.is_empty() && finished_part(name).is_some_and(|part| wanted(&part));
+        let any = |parts: &[Named]| parts.iter().any(|(name, _)| named(name));
+        let mut finished = Vec::new();
+        if effects.iter().any(|(name, _)| named(name)) || any(&other_effects) || any(&of_caustics) {
+            effects.extend(self.denoise_parts(other_effects, noise.estimate)?);
+            let all_caustics = effects.iter().find(|(name, _)| name == "Caustic").map(|(_, part)| part.mean.clone());
+            finished.extend(split_named(effects, picture, noise, &[]));
+            let whole = finished.iter().find(|(name, _)| name == "Caustic").map(|(_, whole)| whole.clone());
+            if let Some((mean, whole)) = all_caustics.zip(whole).filter(|_| any(&of_caustics)) {
+                let caustics = self.denoise_parts(with_rest(of_caustics, &mean), noise.estimate)?;
+                finished.extend(split_named(caustics, &whole, noise, &[]));
+            }
+        }
+        if any(&of_groups) {
+            let groups = self.denoise_parts(with_rest(of_groups, &noise.estimate.mean), noise.estimate)?;
+            finished.extend(split_named(groups, picture, noise, &[]));
+        }
+        // They sum to the picture only together. Other renderers have layers with some of these names.
+        if lobes.len() == lobe_names().count() && any(&lobes) {
+            let lobes = self.denoise_parts(lobes, noise.estimate)?;
+            finished.extend(split_named(lobes, picture, noise, colors));
+        }
+        finished.retain(|(name, _)| named(name));
+        Ok(finished.into_iter().filter_map(|(name, part)| Some((finished_part(&name)?, part))).collect())
+    }
+
+    /// Denoises additive parts of an estimate with its guides and standard errors.
+    fn denoise_parts(&mut self, parts: Vec<Named>, estimate: &Estimate) -> Result<Vec<NamedPart>> {
+        let mut of_part = estimate.clone();
+        let mut denoise = |(name, mean): Named| {
+            of_part.mean = mean;
+            // Directly visible lights are noisy at their edges only.
+            let denoised = if of_part.mean.is_black() || ["Emission", "Emit"].contains(&&*name) {
+                of_part.mean.clone()
+            } else {
+                // Parts are looked at less closely than the picture.
+                self.denoiser.run(&of_part, Quality::Fast, self.stop.as_ref())?
+            };
+            Ok((name, Part { mean: std::mem::take(&mut of_part.mean), denoised }))
+        };
+        parts.into_iter().map(&mut denoise).collect()
+    }
+}
+
+/// The mean, with [`SHARE_OF_PARTS`], of a denoised picture and of the sum of its denoised parts.
+pub(super) fn mean_with_parts(whole: &Picture, parts: &[NamedPart]) -> Picture {
+    let sum = |index: usize, c: usize| parts.iter().map(|(_, part)| part.denoised[index][c]).sum::<f32>();
+    Picture::from_fn(whole.size(), |index| {
+        from_fn(|c| whole[index][c] + SHARE_OF_PARTS * (sum(index, c) - whole[index][c]))
+    })
+}
+
+/// Finishes parts so that they sum to the picture `whole`, whose noise is `noise`. `colors` has the colours of lobes, if
+/// the parts are those of lobes.
+fn split_named(parts: Vec<NamedPart>, whole: &Picture, noise: Noise<'_>, colors: &[Named]) -> Vec<Named> {
+    let (names, parts): (Vec<String>, Vec<Part>) = parts.into_iter().unzip();
+    let colors: Vec<Option<&Picture>> = names.iter().map(|name| color_of(name, colors)).collect();
+    names.into_iter().zip(split(&parts, whole, noise, &colors)).collect()
+}
+
+/// A picture less its parts.
+fn rest(parts: &[Named], whole: &Picture) -> Picture {
+    let sum = |index: usize, c: usize| parts.iter().map(|(_, part)| part[index][c]).sum::<f32>();
+    Picture::from_fn(whole.size(), |index| from_fn(|c| whole[index][c] - sum(index, c)))
+}
+
+/// Whether the light in `rest` is more than rounding beside that of the picture `whole`.
+fn is_light(rest: &Picture, whole: &Picture) -> bool {
+    let sum = |light: &Picture| light.iter().flatten().map(|value| f64::from(*value)).sum::<f64>();
+    sum(rest) > PARTS_ROUNDING * sum(whole)
+}
+
+/// The light of light groups. If lights outside all groups have added any to `whole`, their light comes first, without
+/// a name; the last part takes the remainder of rounding.
+fn with_rest(mut groups: Vec<Named>, whole: &Picture) -> Vec<Named> {
+    let rest = rest(&groups, whole).map(|value| value.max(0.0));
+    if is_light(&rest, whole) {
+        groups.insert(0, (String::new(), rest));
+    }
+    groups
 }
 
 /// Finishes additive parts of a picture so that they sum to the finished picture `whole`. `noise` belongs to the whole
@@ -23,7 +178,7 @@ pub struct Part {
 /// Light of the whole picture at a pixel where no part has any, which the denoiser has brought from around, goes to the
 /// last part. `colors` has a colour for parts that compositors divide by it; such a part gets no light where its colour is
 /// black, and the first part, which must not have a colour then, gets light that none of the others can have.
-pub fn split(parts: &[Part], whole: &Picture, noise: Noise<'_>, colors: &[Option<&Picture>]) -> Vec<Picture> {
+fn split(parts: &[Part], whole: &Picture, noise: Noise<'_>, colors: &[Option<&Picture>]) -> Vec<Picture> {
     let mut finished: Vec<Picture> = parts.iter().map(|part| bounded(&part.mean, &part.denoised, noise).0).collect();
     let is_black = |part: usize, index: usize, c: usize| {
         let color = colors.get(part).copied().flatten();
@@ -32,7 +187,7 @@ pub fn split(parts: &[Part], whole: &Picture, noise: Noise<'_>, colors: &[Option
     for (part, values) in finished.iter_mut().enumerate().filter(|(part, _)| matches!(colors.get(*part), Some(Some(_))))
     {
         values.par_iter_mut().enumerate().for_each(|(index, value)| {
-            *value = std::array::from_fn(|c| if is_black(part, index, c) { 0.0 } else { value[c] });
+            *value = from_fn(|c| if is_black(part, index, c) { 0.0 } else { value[c] });
         });
     }
     let Some((last, others)) = finished.split_last_mut() else { return finished };
@@ -40,18 +195,16 @@ pub fn split(parts: &[Part], whole: &Picture, noise: Noise<'_>, colors: &[Option
         let sum = f64::from(last[c]) + others.iter().map(|part| f64::from(part[index][c])).sum::<f64>();
         if sum > 0.0 { f64::from(whole[index][c]) / sum } else { 0.0 }
     };
-    let scales: Vec<[f64; 3]> = (0..whole.len())
-        .into_par_iter()
-        .map(|index| std::array::from_fn(|c| scale(index, c, &last[index], others)))
-        .collect();
+    let scales: Vec<[f64; 3]> =
+        (0..whole.len()).into_par_iter().map(|index| from_fn(|c| scale(index, c, &last[index], others))).collect();
     for part in others.iter_mut() {
         part.par_iter_mut().zip(&scales).for_each(|(value, scale)| {
-            *value = std::array::from_fn(|c| (f64::from(value[c]) * scale[c]) as f32);
+            *value = from_fn(|c| (f64::from(value[c]) * scale[c]) as f32);
         });
     }
     // The last part takes the remainder, so that the sum has no rounding error.
     last.par_iter_mut().enumerate().for_each(|(index, value)| {
-        *value = std::array::from_fn(|c| {
+        *value = from_fn(|c| {
             let sum = others.iter().map(|part| f64::from(part[index][c])).sum::<f64>();
             (f64::from(whole[index][c]) - sum).max(0.0) as f32
         });

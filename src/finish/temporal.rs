@@ -16,8 +16,9 @@
 //!
 //! Light is averaged relative to the albedo, because textures move by fractions of pixels.
 
+use super::Estimate;
+use super::parts::Named;
 use super::window::{Windows, window};
-use super::{Estimate, Named};
 use crate::error::{Error, ErrorKind, Result};
 use crate::estimator::QUARTERS;
 use crate::film::{Layer, LayerSet, MOTION, Picture, Size, channel_mean};

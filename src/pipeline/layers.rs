@@ -5,7 +5,8 @@ use crate::estimator::PixelAccumulator;
 use crate::film::cryptomatte::{Cryptomatte, PixelRanks, RANKS};
 use crate::film::output::{self, Shape};
 use crate::film::{
-    self, CRYPTOMATTES, Layer, LayerSet, MOTION, Naming, Plane, Sample, Selection, describe, finished_part, part_names,
+    self, CRYPTOMATTES, Layer, LayerSet, MOTION, Naming, Plane, Sample, Selection, describe, finished_part, is_effect,
+    part_names,
 };
 use crate::finish::{reads, reads_for_error};
 use crate::image::exr::Attributes;
@@ -61,7 +62,7 @@ impl LayerCounts {
 /// makes the picture of.
 pub(super) fn finished_parts(layers: &[String], selection: &Selection) -> usize {
     let finished: Vec<String> = layers.iter().filter_map(|name| finished_part(name)).collect();
-    let of_picture = part_names().filter(|part| layers.iter().any(|name| name == part)).count();
+    let of_picture = layers.iter().filter(|name| is_effect(name)).count();
     if finished.iter().any(|name| selection.wants(name)) { finished.len() } else { of_picture }
 }
 
