@@ -51,8 +51,10 @@ def zero(values, scale, bound, resolves):
     seeds, count = values.shape
     noise = student(seeds - 1, ERRORS / count) * values.std(axis=0, ddof=1) / np.sqrt(seeds)
     off = np.abs(values.mean(axis=0))
-    worst = int(np.argmax(off / (noise + bound)))
-    share = float(off[worst] / (noise[worst] + bound))
+    with np.errstate(divide="ignore"):
+        shares = np.divide(off, noise + bound, out=np.zeros_like(off), where=off > 0)
+    worst = int(np.argmax(shares))
+    share = float(shares[worst])
     figure = f"off by {_percent(off[worst])}; allowed {_percent(bound)} and noise of {_percent(noise[worst])}"
     if share > 1:
         return Verdict(False, figure, share)

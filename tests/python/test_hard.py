@@ -63,6 +63,14 @@ class Judges(unittest.TestCase):
         self.assertFalse(judge.equal(noisy(4, mean=1.2), noisy(5), 0.002, 0.1).passed)
         self.assertFalse(judge.equal(np.zeros(SHAPE), np.zeros(SHAPE), 0.002, 0.05).passed)
 
+    def test_without_noise_and_bound_no_mean_may_differ(self):
+        like = np.ones(SHAPE)
+        self.assertTrue(judge.equal(like, like, 0.0, 0.05).passed)
+        for channel in range(3):
+            other = like.copy()
+            other[..., channel] += 1e-9
+            self.assertFalse(judge.equal(other, like, 0.0, 0.05).passed)
+
     def test_exact_sees_the_last_bit(self):
         like = np.float32(noisy(6))
         self.assertTrue(judge.exact(like * np.float32(2.0**40), like, 2.0**40).passed)
