@@ -34,11 +34,11 @@ use relation::{Relation, check};
 use std::ops::Range;
 
 /// Seeds of the scenes whose relations are checked.
-const SCENES: Range<u64> = 0..16;
+const SCENES: Range<u64> = 0..12;
 /// Seeds of scenes for the tests marked long.
-const MORE_SCENES: Range<u64> = 16..60;
+const MORE_SCENES: Range<u64> = 12..60;
 /// Number of scenes of each form with a known picture.
-const KNOWN: u64 = 6;
+const KNOWN: u64 = 4;
 /// Number of scenes that are also read as USD stages. Each starts a converter at most three times.
 const STAGES: u64 = 4;
 
