@@ -5,6 +5,8 @@ mod support;
 #[path = "files/gltf/glb.rs"]
 mod glb;
 
+#[path = "cli/again.rs"]
+mod again;
 #[path = "cli/blur.rs"]
 mod blur;
 #[path = "cli/checkpoints.rs"]

@@ -6,13 +6,13 @@ use super::progress::Form;
 use super::render::{Summary, print_finish, print_picture, warn_unseen};
 use super::say;
 use caustique::error::Result;
-use caustique::film::{LayerSet, Naming, Selection, take_plain_names};
+use caustique::film::{LayerSet, Naming, Selection};
 use caustique::finish::DenoiserChoice;
 use caustique::image::Outputs;
 use caustique::image::exr::{self, Attributes};
 use caustique::pipeline::merge::{MergeEvent, MergeRequest, Shards, is_shard};
 use caustique::pipeline::seeds::Seeds;
-use caustique::pipeline::{FinishRequest, finish, write_finish};
+use caustique::pipeline::{FinishRequest, RenderedFile, finish, write_finish};
 use caustique::scene::description::PictureDefaults;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -142,11 +142,11 @@ fn average_seeds(args: &MergeArgs) -> Result<()> {
     let mut seeds = Seeds::default();
     let mut read_as = Naming::Plain;
     for path in &args.inputs {
-        let (mut set, attributes) = exr::read(path)?;
-        if Naming::of(&set) == Naming::Blender {
+        let RenderedFile { set, attributes, naming, remarks } = RenderedFile::read(path)?;
+        remarks.iter().for_each(|remark| say(&format!("warning: {remark}")));
+        if naming == Naming::Blender {
             read_as = Naming::Blender;
         }
-        take_plain_names(&mut set);
         seeds.add(path, set, attributes)?;
     }
     let naming = args.exr_naming.unwrap_or(read_as);

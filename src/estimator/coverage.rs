@@ -1,5 +1,6 @@
 //! First hits of a pixel's camera paths by instance, for cryptomattes and alpha.
 
+use crate::transport::HOLE;
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
@@ -16,7 +17,8 @@ pub struct Coverage {
 }
 
 impl Coverage {
-    /// Counts one camera path; `instance` is the index of the instance that it hits first, `None` if it hits nothing.
+    /// Counts one camera path; `instance` is the index of the instance that it hits first, or [`HOLE`]; `None` if it hits
+    /// nothing.
     #[inline]
     pub fn add(&mut self, instance: Option<u32>) {
         self.paths += 1;
@@ -46,13 +48,23 @@ impl Coverage {
 
     /// Fraction of camera paths that hit anything, 0 to 1; 0 before the first path.
     pub fn hit_fraction(&self) -> f32 {
-        self.fraction(self.counts.iter().map(|(_, count)| count).sum())
+        self.fraction_of(|instance| instance != HOLE)
+    }
+
+    /// Fraction of camera paths that end at a hole, 0 to 1.
+    pub fn hole_fraction(&self) -> f32 {
+        self.fraction_of(|instance| instance == HOLE)
+    }
+
+    fn fraction_of(&self, counts: impl Fn(u32) -> bool) -> f32 {
+        self.fraction(self.counts.iter().filter(|(instance, _)| counts(*instance)).map(|(_, count)| count).sum())
     }
 
     /// Index of each instance and the fraction (0 to 1) of camera paths that hit it first, in descending order of
     /// fractions.
     pub fn fractions(&self) -> impl Iterator<Item = (u32, f32)> {
         let mut counts = self.counts.clone();
+        counts.retain(|(instance, _)| *instance != HOLE);
         counts.sort_unstable_by_key(|&(instance, count)| (!count, instance));
         counts.into_iter().map(|(instance, count)| (instance, self.fraction(count)))
     }
@@ -77,6 +89,13 @@ mod tests {
         assert_eq!(coverage.hit_fraction(), 0.9);
         let (mut early, mut late) = (Coverage::default(), Coverage::default());
         hits[..4].iter().for_each(|&instance| early.add(instance));
+        hits[4..].iter().for_each(|&instance| late.add(instance));
+        late.join(&early);
+        for _ in 0..10 {
+            late.add(Some(HOLE));
+        }
+        assert_eq!((late.hit_fraction(), late.hole_fraction(), late.fractions().count()), (0.45, 0.5, 7));
+        late = Coverage::default();
         hits[4..].iter().for_each(|&instance| late.add(instance));
         late.join(&early);
         assert_eq!(late.fractions().collect::<Vec<_>>(), shares);

@@ -67,6 +67,19 @@ impl Naming {
         }
     }
 
+    /// A matrix for points in the file's axes, row by row, changed to take points in our world axes.
+    pub fn from_own_axes(self, m: [f32; 16]) -> [f32; 16] {
+        match self {
+            Naming::Plain => m,
+            // Our (x, y, z) is Blender's (x, -z, y).
+            Naming::Blender => std::array::from_fn(|i| match i / 4 {
+                1 => m[8 + i % 4],
+                2 => -m[4 + i % 4],
+                _ => m[i],
+            }),
+        }
+    }
+
     /// Name of the channel in a file that stores a component of a layer; `layer` is its plain name.
     pub fn channel(self, layer: &str, component: &str) -> String {
         let prefix = self.layer(layer);

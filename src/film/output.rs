@@ -145,7 +145,11 @@ fn columns(shape: &Shape) -> Vec<Column> {
     let (catchers, groups) = (shape.catchers.clone(), shape.groups.len());
     let mut columns = vec![
         Column::new("", move |at| {
-            let alpha = if environment { 1.0 } else { covered(at.pixel, &catchers, groups) };
+            let alpha = if environment {
+                1.0 - at.pixel.coverage.hole_fraction()
+            } else {
+                covered(at.pixel, &catchers, groups)
+            };
             at.pixel.mean(own).as_vec3().extend(alpha).to_array()
         }),
         Column::rgb("Noisy", move |p| p.mean(own)),

@@ -81,7 +81,9 @@ pub fn spread(estimate: &Estimate) -> Picture {
         }
         for (index, spread) in (y * size.width..).zip(row) {
             if *spread != [0.0; 3] && estimate.is_exact(index) {
-                let shows_nothing = mean[index] == [0.0; 3];
+                // A medium and shadow catchers show light where alpha is 0.
+                let is_lit = |other: usize| mean[other] != [0.0; 3] && estimate.has_alpha_0(other);
+                let shows_nothing = mean[index] == [0.0; 3] && !window(size, index, REACH).any(is_lit);
                 let mut around = |plane: &Plane| plane.percentile(index, &mut ranked, f32::abs);
                 *spread = planes.each_ref().map(|plane| if shows_nothing { 0.0 } else { around(plane) });
             }
@@ -442,17 +444,23 @@ mod tests {
     }
 
     /// The spread is zero where alpha is zero; a black surface takes the spread of its neighbours, whose rare light may
-    /// have missed it.
+    /// have missed it, and so do black pixels of alpha zero among others that show the light of a medium.
     #[test]
     fn empty_pixels_have_no_spread_and_black_surfaces_have_one() {
         let covered = |index: usize| index % SIZE.width < 20;
-        let mean = plane(|index| if index % 2 == 0 && covered(index) { 1.0 } else { 0.0 });
+        let foggy = |index: usize| index % SIZE.width >= 30;
+        let mean = plane(|index| if index % 2 == 0 && (covered(index) || foggy(index)) { 1.0 } else { 0.0 });
         let alpha = (0..SIZE.pixels()).map(|index| f32::from(u8::from(covered(index)))).collect();
         let noisy = Estimate { alpha: Some(alpha), ..estimate(&mean, mean.clone()) };
         let spread = spread(&noisy);
-        let inside = |index: usize| index % SIZE.width + REACH < 20;
-        for (index, spread) in spread.iter().enumerate().filter(|(index, _)| inside(*index) || !covered(*index)) {
-            assert!(if covered(index) { spread[0] == 1.0 } else { *spread == [0.0; 3] }, "pixel {index}: {spread:?}");
+        let inside = |index: usize| match index % SIZE.width {
+            0..20 => index % SIZE.width + REACH < 20,
+            20..30 => index % SIZE.width + REACH < 30,
+            x => x >= 30 + REACH,
+        };
+        for (index, spread) in spread.iter().enumerate().filter(|(index, _)| inside(*index)) {
+            let has_light = covered(index) || foggy(index);
+            assert!(if has_light { spread[0] == 1.0 } else { *spread == [0.0; 3] }, "pixel {index}: {spread:?}");
         }
     }
 

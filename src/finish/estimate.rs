@@ -70,8 +70,13 @@ impl Estimate {
     pub(super) fn is_exact(&self, index: usize) -> bool {
         let (mean, error) = (self.mean[index], self.deviation[index]);
         let most = mean.into_iter().fold(0.0, f32::max);
-        let shows_nothing = most == 0.0 && self.alpha.as_ref().is_some_and(|alpha| alpha[index] == 0.0);
-        (most > 0.0 || shows_nothing) && error.into_iter().all(|error| error <= ROUNDING * most)
+        (most > 0.0 || (most == 0.0 && self.has_alpha_0(index)))
+            && error.into_iter().all(|error| error <= ROUNDING * most)
+    }
+
+    /// Whether alpha is known to be 0 at pixel `index`.
+    pub(super) fn has_alpha_0(&self, index: usize) -> bool {
+        self.alpha.as_ref().is_some_and(|alpha| alpha[index] == 0.0)
     }
 
     /// The estimate by the first half of the iterations: the mean of the first two of the four quarters.

@@ -145,6 +145,8 @@ pub struct Prepared {
     half: Option<Picture>,
     /// Number of bandwidth levels that the network has combined.
     combined: Option<usize>,
+    /// The estimate that the additive parts sum to, if it is not `estimate`; `None` also if it is unknown.
+    noisy: Option<Picture>,
     /// The additive parts by effect, as far as they are denoised already.
     effects: Vec<NamedPart>,
     /// The other additive parts of the estimate that are finished too.
@@ -370,12 +372,13 @@ impl Finish {
         Ok((estimate, planes))
     }
 
-    /// [`guided`](Self::guided), and the number of bandwidth levels that a network has combined to the estimate.
-    fn estimate(&mut self, set: &LayerSet) -> Result<(Estimate, Option<Planes>, Option<usize>)> {
+    /// [`guided`](Self::guided), and if a network has combined bandwidth levels to the estimate, their number and the
+    /// estimate before.
+    fn estimate(&mut self, set: &LayerSet) -> Result<(Estimate, Option<Planes>, Option<(usize, Picture)>)> {
         let (mut estimate, planes) = self.guided(set)?;
         let Some(combiner) = &mut self.combiner else { return Ok((estimate, planes, None)) };
-        estimate.mean = combiner.run(&LevelStack::of(set)?)?;
-        Ok((estimate, planes, Some(combiner.metadata().levels)))
+        let noisy = std::mem::replace(&mut estimate.mean, combiner.run(&LevelStack::of(set)?)?);
+        Ok((estimate, planes, Some((combiner.metadata().levels, noisy))))
     }
 
     /// Finishes the picture of the layer set and makes the result its beauty; alpha stays. Adds `Error`,
@@ -397,7 +400,8 @@ impl Finish {
         let others = names.into_iter().filter(|name| effects.iter().all(|(effect, _)| effect != name));
         let parts = others.filter_map(|name| set.picture(&name).map(|picture| (name, picture))).collect();
         let error = ErrorSource::of(set, own_level(set));
-        let prepared = Prepared { estimate, denoised, half, combined, effects, parts, colors: lobe_colors(set) };
+        let (combined, noisy) = combined.unzip();
+        let prepared = Prepared { estimate, denoised, half, combined, noisy, effects, parts, colors: lobe_colors(set) };
         self.deliver(prepared, error, wanted)?.insert_into(set)
     }
 
@@ -448,6 +452,7 @@ impl Finish {
         }
         let denoised = self.denoised(&estimate, &effects, planes.as_ref())?;
         let is_denoised = !matches!(self.denoiser, Denoiser::None);
+        let combined = combined.map(|(levels, _)| levels);
         let pictures = temporal::Pictures { estimate, denoised, half, combined, is_denoised };
         Ok(temporal::Frame::new(pictures, parts, motion, correlation))
     }
@@ -461,7 +466,8 @@ impl Finish {
         };
         let average = temporal::average(window, finish_half, parts)?;
         let temporal::Averaged { estimate, denoised, combined, half, parts } = average;
-        Some(Prepared { estimate, denoised, half, combined, effects: Vec::new(), parts, colors: Vec::new() })
+        let (effects, colors) = (Vec::new(), Vec::new());
+        Some(Prepared { estimate, denoised, half, combined, noisy: None, effects, parts, colors })
     }
 
     /// Finishes an estimate and its parts, and estimates the error. `wanted` accepts the names of layers to make.
@@ -474,13 +480,14 @@ impl Finish {
         error: Option<ErrorSource>,
         wanted: impl Fn(&str) -> bool,
     ) -> Result<FinishedPicture> {
-        let Prepared { estimate, denoised, half, combined, effects, parts, colors } = prepared;
+        let Prepared { estimate, denoised, half, combined, noisy, effects, parts, colors } = prepared;
         let error = half.zip(error).map(|(half, source)| error_by_quarters(&source, &estimate, &half, wanted(ERROR)));
         let (error, error_map) = error.unzip();
         let ([picture, spread], clamped) = self.displaced(&estimate, &denoised);
         drop(denoised);
         let noise = self.noise(&estimate, &spread);
-        let parts = self.parts(effects, parts, &colors, &picture, noise, wanted)?;
+        let sum = noisy.as_ref().or(combined.is_none().then_some(&estimate.mean));
+        let parts = self.parts(effects, parts, sum, &colors, &picture, noise, wanted)?;
         let account = Finished { combined, error, error_map: error_map.flatten(), clamped };
         Ok(FinishedPicture { picture, parts, account })
     }

@@ -71,11 +71,13 @@ impl Finish {
     }
 
     /// The finished parts of the picture whose names are wanted, with their layers' names. Parts that together sum to
-    /// the picture, or to its caustics, are all finished if one of them is wanted.
+    /// the picture, or to its caustics, are all finished if one of them is wanted. `sum` is the estimate that they sum to
+    /// with the light of parts that are missing; `None` if it is unknown.
     pub(super) fn parts(
         &mut self,
         mut effects: Vec<NamedPart>,
         parts: Vec<Named>,
+        sum: Option<&Picture>,
         colors: &[Named],
         picture: &Picture,
         noise: Noise<'_>,
@@ -94,6 +96,10 @@ impl Finish {
         let any = |parts: &[Named]| parts.iter().any(|(name, _)| named(name));
         let mut finished = Vec::new();
         if effects.iter().any(|(name, _)| named(name)) || any(&other_effects) || any(&of_caustics) {
+            let other_effects = match sum.filter(|_| effects.is_empty()) {
+                Some(sum) => with_rest(other_effects, sum),
+                None => other_effects,
+            };
             effects.extend(self.denoise_parts(other_effects, noise.estimate)?);
             let all_caustics = effects.iter().find(|(name, _)| name == "Caustic").map(|(_, part)| part.mean.clone());
             finished.extend(split_named(effects, picture, noise, &[]));
@@ -104,7 +110,8 @@ impl Finish {
             }
         }
         if any(&of_groups) {
-            let groups = self.denoise_parts(with_rest(of_groups, &noise.estimate.mean), noise.estimate)?;
+            let groups = with_rest(of_groups, sum.unwrap_or(&noise.estimate.mean));
+            let groups = self.denoise_parts(groups, noise.estimate)?;
             finished.extend(split_named(groups, picture, noise, &[]));
         }
         // They sum to the picture only together. Other renderers have layers with some of these names.
@@ -162,14 +169,14 @@ fn is_light(rest: &Picture, whole: &Picture) -> bool {
     sum(rest) > PARTS_ROUNDING * sum(whole)
 }
 
-/// The light of light groups. If lights outside all groups have added any to `whole`, their light comes first, without
-/// a name; the last part takes the remainder of rounding.
-fn with_rest(mut groups: Vec<Named>, whole: &Picture) -> Vec<Named> {
-    let rest = rest(&groups, whole).map(|value| value.max(0.0));
+/// Parts of `whole`, such as the light of light groups. If there is light in `whole` that none of them has, such as that of
+/// lights outside all groups, it comes first, without a name; the last part takes the remainder of rounding.
+fn with_rest(mut parts: Vec<Named>, whole: &Picture) -> Vec<Named> {
+    let rest = rest(&parts, whole).map(|value| value.max(0.0));
     if is_light(&rest, whole) {
-        groups.insert(0, (String::new(), rest));
+        parts.insert(0, (String::new(), rest));
     }
-    groups
+    parts
 }
 
 /// Finishes additive parts of a picture so that they sum to the finished picture `whole`. `noise` belongs to the whole

@@ -103,6 +103,10 @@ pub fn check_writable(path: &Path) -> Result<()> {
                 Error::new(ErrorKind::Io, path.display(), "belongs to another user, whose files are kept there");
             return Err(error.hint("choose another name, or another folder"));
         }
+        Ok(file) if file.is_file() && file.permissions().readonly() => {
+            let error = Error::new(ErrorKind::Io, path.display(), "is protected against writing");
+            return Err(error.hint("choose another name, or let it be written: chmod u+w"));
+        }
         _ => {}
     }
     temporary_beside(&target).map(drop).map_err(|cause| failure(path, &cause))

@@ -11,6 +11,7 @@ use crate::git_lfs;
 use crate::image::atomic;
 use crate::render::{Candidate, State};
 use crate::scene::gltf;
+use crate::system;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::io::{BufReader, Read, Write};
@@ -68,8 +69,12 @@ pub fn write(path: &Path, head: &Head, state: State<&[PixelAccumulator]>) -> Res
 /// the existing checkpoint, or to overwrite it.
 ///
 /// # Errors
-/// The file is no checkpoint, or, unless `overwrite` is set, the checkpoint of a render that was not finished.
+/// The file is no checkpoint, a pipe, or, unless `overwrite` is set, the checkpoint of a render that was not finished.
 pub fn check_replaceable(path: &Path, overwrite: bool, remedy: &str) -> Result<()> {
+    if std::fs::metadata(path).is_ok_and(|data| system::is_pipe(&data)) {
+        let error = Error::new(ErrorKind::Usage, path.display(), "is a pipe, from which no render can continue");
+        return Err(error.hint("name a file with --checkpoint"));
+    }
     // A device, such as /dev/null, loses nothing.
     if !path.is_file() {
         return Ok(());

@@ -292,29 +292,40 @@ impl Reached {
         self.accuracy.rare
     }
 
-    /// The additional cost of halving the error, over the cost of the render so far; `None` if bias forbids it.
-    pub fn halving(&self) -> Option<f64> {
+    /// Additional iterations after which the error is half of what it is; `None` if bias forbids it.
+    fn iterations_to_half(&self) -> Option<f64> {
         let iterations = self.accuracy.iterations_to(0.5 * self.error())?;
-        Some(iterations / self.last.iterations as f64 - 1.0)
+        Some(iterations - self.last.iterations as f64)
     }
 
     /// Additional seconds after which the error is half of what it is; `None` if bias forbids it.
     pub fn seconds_to_half(&self) -> Option<f64> {
-        Some(self.halving()? * self.last.seconds)
+        Some(self.iterations_to_half()? * self.pace(|moment| moment.seconds))
+    }
+
+    /// Mean cost of an iteration, in the unit of `spent`. What came before the first moment of the history, such as a
+    /// pilot, is not needed again, so it does not count where the history has two moments.
+    fn pace(&self, spent: impl Fn(&HistoryEntry) -> f64) -> f64 {
+        let (first, last) = (self.history.first().unwrap_or(&self.last), &self.last);
+        match last.iterations.saturating_sub(first.iterations) {
+            0 => spent(last) / last.iterations.max(1) as f64,
+            iterations => (spent(last) - spent(first)) / iterations as f64,
+        }
     }
 
     /// Writes the error of the finished picture to the header, in place of the error of the estimate.
     fn write(&self, header: &mut Map<String, Value>, reproducible: bool) {
-        if let Some(noisy) = header.insert("error".into(), self.error().into()) {
+        let estimated = header.insert("error".into(), self.error().into());
+        let before = header.insert("error_of".into(), FINISHED_PICTURE.into());
+        if let Some(noisy) = estimated.filter(|_| before.is_none_or(|of| of != FINISHED_PICTURE)) {
             header.insert("error_noisy".into(), noisy);
         }
-        header.insert("error_of".into(), FINISHED_PICTURE.into());
         let mut halving = json!({"error": 0.5 * self.error()});
-        if let Some(more) = self.halving() {
-            halving["iterations"] = (more * self.last.iterations as f64).ceil().into();
+        if let Some(more) = self.iterations_to_half() {
+            halving["iterations"] = more.ceil().into();
             if !reproducible {
-                halving["seconds"] = (more * self.last.seconds).into();
-                halving["core_seconds"] = (more * self.last.cpu_seconds).into();
+                halving["seconds"] = (more * self.pace(|moment| moment.seconds)).into();
+                halving["core_seconds"] = (more * self.pace(|moment| moment.cpu_seconds)).into();
             }
         }
         let metric = "root of relMSE, trimmed of the worst 0.5 % of the pixels";
@@ -331,7 +342,10 @@ impl Reached {
         header.insert("accuracy".into(), accuracy);
         let moments = header.get_mut("history").and_then(Value::as_array_mut).into_iter().flatten();
         for (entry, moment) in moments.zip(&self.history) {
-            entry["finished"] = moment.finished.map(|_| self.accuracy.error(moment.iterations)).into();
+            // A picture that is finished again keeps the errors that earlier moments had.
+            if moment.finished.is_some() || entry.get("finished").is_none() {
+                entry["finished"] = moment.finished.map(|_| self.accuracy.error(moment.iterations)).into();
+            }
         }
     }
 }
@@ -347,20 +361,69 @@ pub fn write_finish(header: &mut Value, finish: &OpenFinish, finished: &Finished
 
 fn write_error(header: &mut Map<String, Value>, finished: &Finished) {
     let iterations = header.get("iterations").and_then(Value::as_u64).unwrap_or(1).max(1);
-    let last = header.get("history").and_then(Value::as_array).and_then(|moments| moments.last());
-    let number = |key: &str| last.and_then(|last| last.get(key)).and_then(Value::as_f64);
-    let timed = number("seconds").is_some();
-    let unseen = header.get("unseen").and_then(|unseen| unseen.get("error")).and_then(Value::as_f64).unwrap_or(0.0);
-    let error = finished.error.map(|error| FinishedError { unseen: unseen * unseen, ..error });
-    let history = HistoryEntry {
-        seconds: number("seconds").unwrap_or(0.0),
-        cpu_seconds: number("cpu_seconds").unwrap_or(0.0),
-        iterations,
+    let moments = header.get("history").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
+    let timed = moments.last().is_some_and(|last| last.get("seconds").is_some_and(Value::is_number));
+    let entry = |moment: &Value| HistoryEntry {
+        seconds: moment["seconds"].as_f64().unwrap_or(0.0),
+        cpu_seconds: moment["cpu_seconds"].as_f64().unwrap_or(0.0),
+        iterations: moment["iterations"].as_u64().unwrap_or(iterations),
         light_paths: 0,
         estimate: None,
-        finished: error,
+        finished: None,
     };
-    if let Some(reached) = Reached::of(vec![history], error) {
+    let mut history: Vec<HistoryEntry> = moments.iter().map(entry).collect();
+    if history.is_empty() {
+        history.push(entry(&Value::Null));
+    }
+    let unseen = header.get("unseen").and_then(|unseen| unseen.get("error")).and_then(Value::as_f64).unwrap_or(0.0);
+    let error = finished.error.map(|error| FinishedError { unseen: unseen * unseen, ..error });
+    if let Some(reached) = Reached::of(history, error) {
         reached.write(header, !timed);
+    }
+}
+
+/// Removes from a stored picture, before it is finished anew, the error of the picture that it was finished to: a finish
+/// without quarters does not replace it.
+pub fn forget_error(header: &mut Value, set: &mut LayerSet) {
+    let Some(header) = header.as_object_mut().filter(|header| header.get("error_of") == Some(&FINISHED_PICTURE.into()))
+    else {
+        return;
+    };
+    set.layers.retain(|layer| layer.name != ERROR);
+    header.remove("accuracy");
+    header.remove("worst");
+    let noisy = header.remove("error_noisy").unwrap_or(Value::Null);
+    header.insert("error".into(), noisy);
+    header.insert("error_of".into(), "Noisy".into());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What came before the first iteration is not charged again.
+    #[test]
+    fn halving_costs_iterations_alone() {
+        let moment = |iterations: u64, seconds: f64, finished: Option<FinishedError>| HistoryEntry {
+            seconds,
+            cpu_seconds: 2.0 * seconds,
+            iterations,
+            light_paths: 0,
+            estimate: None,
+            finished,
+        };
+        let error = FinishedError { noise: 0.01, deviation: 1e-6, bias: 0.0, rare: 0.0, unseen: 0.0 };
+        for (history, pace) in [
+            (vec![moment(1, 10.0, None), moment(101, 110.0, Some(error))], 1.0),
+            (vec![moment(50, 100.0, Some(error))], 2.0),
+        ] {
+            let reached = Reached::of(history, Some(error)).expect("there is an error");
+            let iterations = reached.iterations_to_half().expect("there is no bias");
+            assert!((reached.seconds_to_half().expect("as before") / (pace * iterations) - 1.0).abs() < 1e-9);
+            let mut header = Map::new();
+            reached.write(&mut header, false);
+            let core_seconds = header["accuracy"]["halving"]["core_seconds"].as_f64().expect("it is stated");
+            assert!((core_seconds / (2.0 * pace * iterations) - 1.0).abs() < 1e-9);
+        }
     }
 }

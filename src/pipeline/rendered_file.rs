@@ -1,8 +1,9 @@
 //! Reads the EXR of a render to finish it.
 
 use crate::error::Result;
-use crate::film::{LayerSet, Naming, current_name, plain_name, take_plain_names};
+use crate::film::{LayerSet, Naming, ascii_json, current_name, plain_name, take_plain_names};
 use crate::image::exr::{self, Attributes};
+use serde_json::{Map, Value};
 use std::path::Path;
 
 /// The EXR of a render of this or another program.
@@ -18,12 +19,12 @@ pub struct RenderedFile {
 }
 
 impl RenderedFile {
-    /// Reads a file. Layers whose names cannot be written are left out, with a remark.
+    /// Reads a file. Layers whose names and text attributes that cannot be written are left out, with a remark.
     ///
     /// # Errors
     /// As for [`exr::read`].
     pub fn read(path: &Path) -> Result<RenderedFile> {
-        Ok(RenderedFile::of(path, exr::read(path)?))
+        RenderedFile::read_layers(path, |_| true)
     }
 
     /// The header of a file: its layers lack their values. Reads no pixels.
@@ -39,15 +40,39 @@ impl RenderedFile {
     /// # Errors
     /// As for [`exr::read`].
     pub fn read_layers(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<RenderedFile> {
-        Ok(RenderedFile::of(path, exr::read_layers(path, |name| wanted(&current_name(plain_name(name))))?))
+        Ok(RenderedFile::of(path, exr::read_render(path, |name| wanted(&current_name(plain_name(name))))?))
     }
 
-    fn of(path: &Path, (mut set, attributes): (LayerSet, Attributes)) -> RenderedFile {
+    fn of(path: &Path, (mut set, mut attributes): (LayerSet, Attributes)) -> RenderedFile {
         let naming = Naming::of(&set);
         let remark = |name: String| {
             format!("{}: layer \"{name}\" cannot be written under this name and is left out", path.display())
         };
-        let remarks = take_plain_names(&mut set).into_iter().map(remark).collect();
+        let mut remarks: Vec<String> = take_plain_names(&mut set).into_iter().map(remark).collect();
+        if let Some(frame) = &mut attributes.frame {
+            frame.world_to_camera = naming.from_own_axes(frame.world_to_camera);
+            frame.world_to_ndc = frame.world_to_ndc.map(|matrix| naming.from_own_axes(matrix));
+        }
+        for name in take_ascii(&mut attributes) {
+            remarks.push(format!("{}: attribute \"{name}\" is not ASCII and is left out", path.display()));
+        }
         RenderedFile { set, attributes, naming, remarks }
     }
+}
+
+/// Makes all attributes ASCII, which EXR headers require: objects of JSON, such as the names of a cryptomatte, by escapes.
+/// Removes other text that is not ASCII, and returns its names.
+fn take_ascii(attributes: &mut Attributes) -> Vec<String> {
+    let mut left = Vec::new();
+    attributes.texts.retain(|name, text| {
+        if !text.is_ascii() && serde_json::from_str::<Map<String, Value>>(text).is_ok() {
+            *text = ascii_json(text);
+        }
+        let fits = name.is_ascii() && text.is_ascii();
+        if !fits {
+            left.push(name.clone());
+        }
+        fits
+    });
+    left
 }

@@ -4,12 +4,14 @@
 use super::checkpoint::first_difference;
 use super::deliver::FINISHED_PICTURE;
 use crate::error::{Error, ErrorKind, Result};
+use crate::estimator::QUARTERS;
 use crate::film::cryptomatte::{Cryptomatte, Id, PixelRanks, RANKS};
 use crate::film::kind::Merge;
 use crate::film::{CRYPTOMATTES, Layer, LayerSet, kind_of};
 use crate::image::exr::{self, Attributes};
 use crate::math::Vec3;
 use serde_json::{Map, Value, json};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Options that may differ between renders whose mean is made.
@@ -20,7 +22,7 @@ const FREE_OPTIONS: [&str; 9] =
 struct Source {
     path: PathBuf,
     header: Value,
-    iterations: f64,
+    iterations: u64,
 }
 
 /// Renders of one picture with different seeds, added up to make their mean.
@@ -35,6 +37,15 @@ pub struct Seeds {
 /// The rule by which the values of the layer `name` are merged.
 fn merge_rule(name: &str) -> Merge {
     kind_of(name).map_or(Merge::Mean, |(kind, _)| kind.merge)
+}
+
+/// Number of the iterations of a render that the layer `name` is the mean of: all, or those of a quarter, which iterations
+/// take in turn.
+fn iterations_of(name: &str, iterations: u64) -> f64 {
+    let number = || name.strip_prefix("Quarter")?.parse::<u64>().ok();
+    let quarters = QUARTERS as u64;
+    let all = |number: u64| (iterations + quarters - number.clamp(1, quarters)) / quarters;
+    number().map_or(iterations, all) as f64
 }
 
 impl Merge {
@@ -71,9 +82,9 @@ impl Seeds {
     pub fn add(&mut self, path: &Path, mut set: LayerSet, attributes: Attributes) -> Result<()> {
         let source = self.source(path, &set, &attributes)?;
         let iterations = source.iterations;
-        self.add_mattes(&set, iterations);
+        self.add_mattes(&set, iterations as f64);
         for layer in &mut set.layers {
-            let rule = merge_rule(&layer.name);
+            let (rule, iterations) = (merge_rule(&layer.name), iterations_of(&layer.name, iterations));
             let first = self.sum.as_ref().map(|(sum, _)| sum.get(&layer.name));
             for plane in &mut layer.planes {
                 let before = match first {
@@ -106,7 +117,7 @@ impl Seeds {
 
     fn source(&self, path: &Path, set: &LayerSet, attributes: &Attributes) -> Result<Source> {
         let error = |cause: String| Error::new(ErrorKind::Usage, path.display(), cause);
-        let header = attributes.object().filter(|header| header["iterations"].as_f64().is_some_and(|n| n > 0.0));
+        let header = attributes.object().filter(|header| header["iterations"].as_u64().is_some_and(|n| n > 0));
         let Some(header) = header else {
             return Err(error("is no render of caustique".into()).hint("merge renders of other seeds, or shards"));
         };
@@ -119,11 +130,16 @@ impl Seeds {
                 return Err(error(cause).hint("merge renders that differ in their --seed alone"));
             }
         }
-        if let Some((sum, _)) = &self.sum
-            && (sum.width, sum.height) != (set.width, set.height)
-        {
-            let cause = format!("is {} x {}, the others {} x {}", set.width, set.height, sum.width, sum.height);
-            return Err(error(cause).hint("merge renders of one picture"));
+        if let Some((sum, others)) = &self.sum {
+            if (sum.width, sum.height) != (set.width, set.height) {
+                let cause = format!("is {} x {}, the others {} x {}", set.width, set.height, sum.width, sum.height);
+                return Err(error(cause).hint("merge renders of one picture"));
+            }
+            let (theirs, own) = (manifests(others), manifests(attributes));
+            if !own.is_subset(&theirs) && !theirs.is_subset(&own) {
+                let cause = "shows objects or materials of other names than the others".to_owned();
+                return Err(error(cause).hint("merge renders of one scene"));
+            }
         }
         let same = |other: &&Source| other.header["seed"] == header["seed"] || header["seed"].is_null();
         if let Some(other) = self.sources.iter().find(same) {
@@ -131,7 +147,7 @@ impl Seeds {
                 format!("has the seed {} as {} has: the same noise twice", header["seed"], other.path.display());
             return Err(error(cause).hint("render each with another --seed"));
         }
-        let iterations = header["iterations"].as_f64().unwrap_or(0.0);
+        let iterations = header["iterations"].as_u64().unwrap_or(0);
         Ok(Source { path: path.into(), header, iterations })
     }
 
@@ -168,9 +184,12 @@ impl Seeds {
         let Some((mut set, mut attributes)) = sum else {
             return Err(Error::usage("there is no render"));
         };
-        let total: f64 = sources.iter().map(|source| source.iterations).sum();
+        let total: u64 = sources.iter().map(|source| source.iterations).sum();
+        set.iterations = Some(total);
+        let total_of = |name: &str| sources.iter().map(|source| iterations_of(name, source.iterations)).sum::<f64>();
+        set.layers.retain(|layer| total_of(&layer.name) > 0.0);
         for layer in &mut set.layers {
-            let rule = merge_rule(&layer.name);
+            let (rule, total) = (merge_rule(&layer.name), total_of(&layer.name));
             let values = layer.planes.iter_mut().flat_map(|plane| plane.values.iter_mut());
             values.for_each(|value| *value = rule.finish(*value, total));
             if layer.name == "normal" {
@@ -194,6 +213,11 @@ impl Seeds {
         attributes.insert(exr::ATTRIBUTE, &header(&sources, total))?;
         Ok((set, attributes))
     }
+}
+
+/// The names of objects and of materials in the attributes of a render's cryptomattes.
+fn manifests(attributes: &Attributes) -> BTreeSet<&String> {
+    attributes.texts.iter().filter(|(name, _)| name.ends_with("/manifest")).map(|(_, manifest)| manifest).collect()
 }
 
 /// Whether any of the renders states the error of its finished picture.
@@ -247,19 +271,20 @@ fn unseen(sources: &[Source]) -> Option<Value> {
 }
 
 /// The header of the mean: the header of the first render with sums over all renders.
-fn header(sources: &[Source], total: f64) -> Value {
+fn header(sources: &[Source], total: u64) -> Value {
     let mut header: Map<String, Value> =
         sources.first().and_then(|source| source.header.as_object().cloned()).unwrap_or_default();
     let sum = |key: &str| sources.iter().map(|source| source.header[key].as_f64().unwrap_or(0.0)).sum::<f64>();
     // Errors of estimates are independent, so their squares add with squared weights. Errors of finished pictures are
     // correlated by the denoiser, so the bound is the mean of their squares.
     let weight = |source: &Source| {
-        if have_finished_errors(sources) { source.iterations * total } else { source.iterations.powi(2) }
+        let own = source.iterations as f64;
+        if have_finished_errors(sources) { own * total as f64 } else { own * own }
     };
     let squares = sources.iter().map(|source| Some(weight(source) * source.header["error"].as_f64()?.powi(2)));
-    let error = squares.sum::<Option<f64>>().map(|squares| squares.sqrt() / total);
+    let error = squares.sum::<Option<f64>>().map(|squares| squares.sqrt() / total as f64);
     for (key, value) in [
-        ("iterations", json!(total as u64)),
+        ("iterations", json!(total)),
         ("light_paths", json!(sum("light_paths") as u64)),
         ("rejected", json!(sum("rejected") as u64)),
         ("rejected_by", rejected_by(sources)),
@@ -271,6 +296,8 @@ fn header(sources: &[Source], total: f64) -> Value {
     ] {
         header.insert(key.into(), value);
     }
+    // They describe the first render alone.
+    ["accuracy", "error_noisy", "worst"].iter().for_each(|key| drop(header.remove(*key)));
     header.extend(unseen(sources).map(|unseen| ("unseen".to_owned(), unseen)));
     let names: Vec<String> = sources.iter().map(|source| source.path.display().to_string()).collect();
     let seeds: Vec<&Value> = sources.iter().map(|source| &source.header["seed"]).collect();

@@ -1,13 +1,13 @@
 //! The temporal finish of files: reads the frames of an animation around each frame, and finishes them together.
 
-use super::deliver::write_finish;
+use super::deliver::{forget_error, write_finish};
 use super::finish::OpenFinish;
 use super::rendered_file::RenderedFile;
 use crate::error::{Error, ErrorKind, Result};
 use crate::film::{LOBE_COLORS, Layer, LayerSet, lobe_names};
 use crate::finish::temporal::{self, REACH, WINDOW};
-use crate::finish::{ERROR, ErrorSource, Finished, parts_to_finish};
-use crate::image::exr::{self, Attributes};
+use crate::finish::{ERROR, ErrorSource, parts_to_finish};
+use crate::image::exr;
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -97,11 +97,17 @@ impl FrameFiles {
         let error = ErrorSource::read(&header, |names| self.layers(number, names))?;
         let picture = finish.finish().deliver(average, error, wanted).map_err(within)?;
         let mut file = RenderedFile::read_layers(&path, |name| !picture.replaces(name))?;
+        let object = file.attributes.object();
+        let mut object = object.unwrap_or_else(|| json!({"version": env!("CARGO_PKG_VERSION")}));
+        forget_error(&mut object, &mut file.set);
         let finished = picture.insert_into(&mut file.set).map_err(within)?;
         // Replaced layers keep their places, except the error.
         let place = |layer: &Layer| header.layers.iter().position(|old| old.name == layer.name && layer.name != ERROR);
         file.set.layers.sort_by_key(|layer| place(layer).unwrap_or(usize::MAX));
-        write_header(&mut file.attributes, finish, &finished, [&around, &averaged])?;
+        write_finish(&mut object, finish, &finished);
+        object["combined"][WINDOW_KEY] = json!(around);
+        object["combined"][AVERAGED_KEY] = json!(averaged);
+        file.attributes.insert(exr::ATTRIBUTE, &object)?;
         Ok(RenderedFile { remarks, ..file })
     }
 
@@ -194,17 +200,3 @@ impl FrameFiles {
 const WINDOW_KEY: &str = "window";
 /// Key of the header's object `combined` with the numbers of the frames that are averaged.
 const AVERAGED_KEY: &str = "averaged";
-
-/// Writes the finish into the header of a frame.
-fn write_header(
-    attributes: &mut Attributes,
-    finish: &OpenFinish,
-    finished: &Finished,
-    [window, averaged]: [&[u32]; 2],
-) -> Result<()> {
-    let mut object = attributes.object().unwrap_or_else(|| json!({"version": env!("CARGO_PKG_VERSION")}));
-    write_finish(&mut object, finish, finished);
-    object["combined"][WINDOW_KEY] = json!(window);
-    object["combined"][AVERAGED_KEY] = json!(averaged);
-    attributes.insert(exr::ATTRIBUTE, &object)
-}

@@ -29,7 +29,7 @@ pub use walk::probe::{GatherPoint, Probe};
 pub use walk::roulette::{MAX_SPLITS, SPARED_BY_ROULETTE};
 pub use walk::scattering_vertex::{ScatterPoint, lit_side};
 pub use walk::segment::{
-    Arrival, End, FirstHit, MediumArrival, PrecomputedHit, ShadowRay, Start, Visibility, next_surface, shadow_ray,
+    Arrival, End, FirstHit, HOLE, MediumArrival, PrecomputedHit, ShadowRay, Start, Visibility, next_surface, shadow_ray,
 };
 pub use walk::vertex::{MediumLight, MediumVertex, Next, Scattered, Vertex, Visitor};
 pub use walk::visible::visible_surface;

@@ -65,6 +65,8 @@ fn holdouts_are_black_and_light_others_by_all_methods() {
         assert!(around.iter().any(|&pixel| plain[pixel].mean(0).x > 0.0), "{method:?}");
         let covered = [&plain, &holdout].map(|pixels| pixels[middle].coverage.hit_fraction());
         assert_eq!(covered, [1.0, 0.0], "{method:?}");
+        let holes = [&plain, &holdout].map(|pixels| pixels[middle].coverage.hole_fraction());
+        assert_eq!(holes, [0.0, 1.0], "{method:?}");
         let row = 11 * SIZE as usize;
         let [a, b] = [&plain, &holdout].map(|of| of[row..].iter().map(|pixel| pixel.mean(0).x).sum::<f64>());
         assert!((a / b - 1.0).abs() < 0.05, "{method:?}: the floor is {a} and {b}");

@@ -37,9 +37,23 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         Some(frames) => sequence::run(args, frames),
         None => {
             sequence::refuse_patterns(args)?;
+            if args.skip_existing && args.run.resume.is_none() && sequence::is_there(args) {
+                pass_over(args, None, "is there");
+                return Ok(());
+            }
             render_one(args, &files::outputs(args)?, None)
         }
     })
+}
+
+/// Says that the output of a picture, of a scene or of a frame, stays as it is, and why.
+fn pass_over(args: &RenderArgs, frame: Option<u32>, why: &str) {
+    if args.progress.for_people() {
+        let frame = frame.map_or(String::new(), |frame| format!("frame {frame}: "));
+        say(&format!("{frame}{} {why}", args.output.display()));
+    }
+    let output = events::path(&args.output);
+    events::print("skipped", json!({"frame": frame, "output": output, "message": why}));
 }
 
 /// Renders one picture, of a scene or of a frame. Everything that can be wrong is found before the first light path.
@@ -249,15 +263,17 @@ impl<'a> Reports<'a> {
         // The EXR comes last: where it exists, the frame is done.
         let others = args.picture.write_png(set, &made_for).and(techniques::write(args, techniques, &made_for));
         let others = files::write_usd_layer(args, set).and(others);
-        let written = files::write(args, set, attributes, sums.as_ref()).and(others);
+        let written = files::write(args, set, attributes, sums.as_ref());
         if let Some(mut preview) = preview {
             preview.show(beauty(set), attributes.frame);
         }
         print_end(args, &summary, &delivery, &reason_if_black);
         written?;
-        // A file that is already gone is no error: the picture is safe.
-        delivery.obsolete_checkpoint.iter().for_each(|file| drop(std::fs::remove_file(file)));
+        // The estimate is in the EXR; the checkpoint can make the other pictures again.
         estimate.into_iter().for_each(Draft::remove);
+        others?;
+        // A file that is already gone is no error.
+        delivery.obsolete_checkpoint.iter().for_each(|file| drop(std::fs::remove_file(file)));
         files::remove_leftovers(args);
         if talk {
             Summary::print_files(args, set, techniques.len());

@@ -1,17 +1,16 @@
 //! `--frames`: renders frames one after the other.
 
-use super::files;
 use super::options::RenderArgs;
+use super::{files, pass_over};
 use crate::cli::claim::{self, Claim, Claimed};
 use crate::cli::finish_frames::FrameFinish;
 use crate::cli::progress::FrameOfRun;
 use crate::cli::signals::Interrupt;
-use crate::cli::{events, output, say};
+use crate::cli::{output, say};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::options::{FrameSeed, Frames, is_pattern, path_of_frame};
 use caustique::pipeline::merge::is_shard;
 use caustique::scene::{blend, gltf, usd};
-use serde_json::json;
 
 /// Renders the frames in order. Ends at the first frame that fails, as Blender does; the frames before it are written.
 pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
@@ -24,13 +23,6 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
     let count = frames.iter().len();
     for (before, frame) in frames.iter().enumerate() {
         let mut one = args.at(frame);
-        let pass_over = |why: String| {
-            if args.progress.for_people() {
-                say(&format!("frame {frame}: {} {why}", one.output.display()));
-            }
-            let output = events::path(&one.output);
-            events::print("skipped", json!({"frame": frame, "output": output, "message": why}));
-        };
         // The checkpoint that a stopped run has left of this frame.
         let left = || {
             let left = one.saving().map(|saving| saving.path);
@@ -38,7 +30,7 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
         };
         let done = || args.skip_existing && left().is_none() && is_there(&one);
         if done() {
-            pass_over("is there".into());
+            pass_over(&one, Some(frame), "is there");
             files::remove_leftovers(&one);
             claim::remove_dead(&one.output);
             continue;
@@ -46,7 +38,7 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
         // Held until the frame is written.
         let _claim = match args.skip_existing.then(|| Claim::claim(&one.output)).transpose()? {
             Some(Claimed::Elsewhere(owner)) => {
-                pass_over(format!("is rendered by {owner}"));
+                pass_over(&one, Some(frame), &format!("is rendered by {owner}"));
                 continue;
             }
             Some(Claimed::Here(claim)) => Some(claim),
@@ -54,7 +46,7 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
         };
         // Another machine may have written the frame before this one got the claim.
         if done() {
-            pass_over("is there".into());
+            pass_over(&one, Some(frame), "is there");
             continue;
         }
         let left = left();
@@ -112,7 +104,7 @@ fn first_alone(args: &RenderArgs, frames: Frames) -> Frames {
 }
 
 /// Whether the output of the frame is there and whole: a copy may have been cut off, and an empty file is a placeholder.
-fn is_there(args: &RenderArgs) -> bool {
+pub(super) fn is_there(args: &RenderArgs) -> bool {
     let has_sums = || args.options.settings.shard.is_none() || is_shard(&args.output).is_ok_and(|is_shard| is_shard);
     output::is_whole(&args.output) && has_sums()
 }

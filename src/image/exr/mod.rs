@@ -14,7 +14,7 @@ mod zip;
 use std::collections::BTreeMap;
 
 pub use colour_space::ColourSpace;
-pub use read::{read, read_header, read_layers, read_window};
+pub use read::{read, read_header, read_layers, read_render, read_window};
 pub use whole::check_whole;
 pub use write::{Compression, Options, write, write_draft, write_followed};
 
@@ -33,9 +33,9 @@ pub const ATTRIBUTE: &str = "caustique";
 pub struct Attributes {
     /// String attributes by name, ASCII only: Python's OpenEXR refuses a whole file for one byte above 127.
     pub texts: BTreeMap<String, String>,
-    /// Position of the picture in a larger one, and the camera. The reader leaves it empty.
+    /// Position of the picture in a larger one, and the camera; `None` in files that lack its matrix.
     pub frame: Option<Frame>,
-    /// Frame number and frame rate. The reader leaves it empty.
+    /// Frame number and frame rate.
     pub moment: Moment,
 }
 

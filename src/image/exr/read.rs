@@ -15,7 +15,7 @@ use exr::prelude::f16;
 use rayon::prelude::*;
 
 use super::colour_space::convert_to_rec_709;
-use super::{Attributes, zip};
+use super::{ATTRIBUTE, Attributes, Frame, Moment, zip};
 use crate::error::{Error, ErrorKind, Result};
 use crate::files;
 use crate::film::{Layer, LayerSet, Plane, Sample, Size};
@@ -48,6 +48,17 @@ pub fn read_layers(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<(LayerS
     })
 }
 
+/// [`read_layers()`] within the data window alone if the file is a render of this program, which has one data window: what
+/// is written again keeps it. Other programs crop each frame to what it shows.
+///
+/// # Errors
+/// As for [`read()`].
+pub fn read_render(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<(LayerSet, Attributes)> {
+    open(path, |file, length| {
+        decode(file, length, &wanted, Extent::OwnData).map(|(windowed, attributes)| (windowed.set, attributes))
+    })
+}
+
 /// [`read()`] with the layers within the data windows alone, outside which the picture is black.
 ///
 /// # Errors
@@ -63,13 +74,16 @@ enum Extent {
     Display,
     /// The part of the display window in which a part of the file has data.
     Data,
+    /// As `Data` in renders of this program, as `Display` in other files.
+    OwnData,
 }
 
 impl Extent {
     /// The bounds in the coordinates of the file. Without data, one pixel.
     fn bounds(self, headers: &[Header]) -> Outcome<IntegerBounds> {
         let display = headers.first().ok_or_else(|| invalid("no part"))?.shared_attributes.display_window;
-        if self == Extent::Display {
+        let is_own = || texts(headers).contains_key(ATTRIBUTE);
+        if self == Extent::Display || (self == Extent::OwnData && !is_own()) {
             return Ok(display);
         }
         let range = |position: i32, size: usize| [i64::from(position), i64::from(position) + size as i64];
@@ -85,8 +99,8 @@ impl Extent {
     }
 }
 
-/// The layers of an EXR without values, and the string attributes. Reads no pixels, so that a file whose pixels are
-/// damaged is not recognised.
+/// The layers of an EXR without values as [`read_render()`] reads them, and the attributes. Reads no pixels, so that a file
+/// whose pixels are damaged is not recognised.
 ///
 /// # Errors
 /// As for [`read()`].
@@ -94,10 +108,10 @@ pub fn read_header(path: &Path) -> Result<(LayerSet, Attributes)> {
     open(path, |file, _| {
         let reader = exr::block::read(file, false)?;
         let headers = reader.headers();
-        let first = headers.first().ok_or_else(|| invalid("no part"))?;
-        let size = first.shared_attributes.display_window.size;
+        let bounds = Extent::OwnData.bounds(headers)?;
+        let size = bounds.size;
         let layers = layers(headers.iter().map(|header| vec![Vec::new(); header.channels.list.len()]), headers);
-        let attributes = attributes(headers);
+        let attributes = attributes(headers, bounds);
         Ok((LayerSet { width: size.0, height: size.1, layers, iterations: attributes.iterations() }, attributes))
     })
 }
@@ -168,7 +182,7 @@ fn decode(
     }
     let mut set = canvas.into_layers(&meta.headers, wanted);
     convert_to_rec_709(&mut set, meta.headers[0].shared_attributes.chromaticities.as_ref());
-    let attributes = attributes(&meta.headers);
+    let attributes = attributes(&meta.headers, bounds);
     set.iterations = attributes.iterations();
     let corner = [(bounds.position.0, display.position.0), (bounds.position.1, display.position.1)];
     let corner = corner.map(|(own, display)| own.abs_diff(display) as usize);
@@ -381,12 +395,36 @@ fn rank(component: &str) -> (usize, String) {
     ("RGBAXYZWUV".find(letter).unwrap_or(usize::MAX), component.to_owned())
 }
 
-fn attributes(headers: &[Header]) -> Attributes {
-    let mut found = Attributes::default();
+/// All attributes of a file of which the pixels within `bounds` are read.
+fn attributes(headers: &[Header], bounds: IntegerBounds) -> Attributes {
+    let own = |header: &Header| {
+        let own = &header.own_attributes;
+        let display = header.shared_attributes.display_window;
+        let frame = own.world_to_camera.map(|world_to_camera| Frame {
+            display: [display.size.0 as u32, display.size.1 as u32],
+            corner: [bounds.position.0.abs_diff(display.position.0), bounds.position.1.abs_diff(display.position.1)],
+            world_to_camera,
+            world_to_ndc: own.world_to_normalized_device,
+        });
+        let number = match own.other.get(&Text::from("imageCounter")) {
+            Some(AttributeValue::I32(number)) => Some(*number),
+            _ => None,
+        };
+        let rate = own.frames_per_second.and_then(|(frames, seconds)| Some([u32::try_from(frames).ok()?, seconds]));
+        (frame, Moment { number, rate: rate.filter(|rate| !rate.contains(&0)) })
+    };
+    let (frame, moment) = headers.first().map(own).unwrap_or_default();
+    Attributes { texts: texts(headers), frame, moment }
+}
+
+/// The string attributes of all parts by name. Text that is not UTF-8 counts as Latin-1.
+fn texts(headers: &[Header]) -> BTreeMap<String, String> {
+    let mut found = BTreeMap::new();
     for header in headers {
         for (name, value) in header.own_attributes.other.iter().chain(&header.shared_attributes.other) {
             if let AttributeValue::Text(text) = value {
-                found.texts.entry(name.to_string()).or_insert_with(|| text.to_string());
+                let decoded = || String::from_utf8(text.as_slice().to_vec()).unwrap_or_else(|_| text.to_string());
+                found.entry(name.to_string()).or_insert_with(decoded);
             }
         }
     }

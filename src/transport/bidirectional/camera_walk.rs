@@ -497,6 +497,10 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
         self.record.continues(|chance| vertex.survival_chosen(LobeSet::ALL, chance));
     }
 
+    fn hole(&mut self) {
+        self.sample.first = Some(FirstHit::HOLE);
+    }
+
     #[inline]
     fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, flight: FlightDensity) {
         if let Some(scattered) = scattered {

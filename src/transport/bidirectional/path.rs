@@ -24,7 +24,7 @@ use crate::transport::walk::pass_through::{BulbHit, PassThroughHit, to_infinity}
 use crate::transport::walk::pixel_sample::PixelSample;
 use crate::transport::walk::roulette::SPARED_BY_ROULETTE;
 use crate::transport::walk::scattering_vertex::ScatterPoint;
-use crate::transport::walk::segment::Visibility;
+use crate::transport::walk::segment::{FirstHit, Visibility};
 use crate::transport::walk::vertex::{MediumLight, MediumVertex, Next, Scattered, Vertex, Visitor};
 use crate::transport::walk::{Segment, walk};
 use bumpalo::Bump;
@@ -297,6 +297,10 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
         self.lit(vertex);
         self.history.leave(None);
         self.next()
+    }
+
+    fn hole(&mut self) {
+        self.sample.first = Some(FirstHit::HOLE);
     }
 
     fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, _: FlightDensity) {

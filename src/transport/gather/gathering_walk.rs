@@ -410,6 +410,10 @@ impl<'a, B: GatherBandwidths> Visitor<'a> for GatheringWalk<'_, B> {
         }
     }
 
+    fn hole(&mut self) {
+        self.sample.first = Some(FirstHit::HOLE);
+    }
+
     #[inline]
     fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, _: FlightDensity) {
         let scene = self.scene;

@@ -3,7 +3,7 @@
 use super::PathStart;
 use super::initial_media::InitialMedium;
 use super::pixel_sample::PixelSample;
-use super::segment::{PrecomputedHit, camera_token};
+use super::segment::{HOLE, PrecomputedHit, camera_token};
 use crate::camera::{Camera, GROUP_SIZE, TilePixel};
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::path_class::{ClassSet, PathClass};
@@ -87,7 +87,7 @@ impl CameraPaths<'_> {
     /// Depth along the camera axis and position of the first hit of a sample (scene units, in the coordinates of the
     /// scene file); `None` if it hits nothing.
     pub fn first_hit(&self, sample: &PixelSample) -> Option<(f32, Vec3)> {
-        let p = sample.first?.p;
+        let p = sample.first.filter(|first| first.instance != HOLE)?.p;
         Some((self.camera.depth(p), (p.as_dvec3() + self.scene.origin).as_vec3()))
     }
 

@@ -224,6 +224,7 @@ impl<'a> Path<'a> {
                 && let End::Surface(arrival) = &end
                 && self.scene.shapes.instances[arrival.surface.instance as usize].holdout
             {
+                visitor.hole();
                 return;
             }
             if self.depth == 1 && self.linked.is_some_and(|light| !receives(self.scene, &end, light)) {

@@ -32,13 +32,21 @@ pub struct Arrival {
     pub distance: f32,
 }
 
+/// In place of the instance that a camera path hits first: it ends at a hole in the picture, such as a holdout.
+pub const HOLE: u32 = u32::MAX;
+
 /// The first visible hit of a camera path, for coverage and depth.
 #[derive(Clone, Copy, Debug)]
 pub struct FirstHit {
     /// World position.
     pub p: Vec3,
-    /// Index of the instance that is hit.
+    /// Index of the instance that is hit, or [`HOLE`].
     pub instance: u32,
+}
+
+impl FirstHit {
+    /// A hole in the picture, which has no position.
+    pub const HOLE: FirstHit = FirstHit { p: Vec3::NAN, instance: HOLE };
 }
 
 /// A collision of a ray in a medium.

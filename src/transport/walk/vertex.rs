@@ -269,6 +269,8 @@ pub trait Visitor<'a>: Sized {
     }
     /// The path has ended because its throughput is not finite.
     fn lost(&mut self) {}
+    /// The camera path ends at a holdout, a hole in the picture.
+    fn hole(&mut self) {}
     /// The path leaves the scene along `direction`. `flight` has the probability densities of flight to infinity.
     fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, flight: FlightDensity) {
         let _ = (direction, throughput, scattered, flight);
