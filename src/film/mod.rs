@@ -14,6 +14,6 @@ pub use kind::{
     finished_part, former_name, is_effect, kind_of, lobe_names, part_names,
 };
 pub use layers::{Layer, LayerSet, Plane, Role, Sample};
-pub use naming::{Naming, check_names, plain_name, take_plain_names};
+pub use naming::{Naming, VIEW_LAYER, check_names, plain_name, take_plain_names};
 pub use picture::{Picture, Size, channel_mean};
 pub use selection::Selection;

@@ -10,6 +10,9 @@ use super::layers::{Layer, LayerSet, Plane};
 use crate::error::{Error, ErrorKind, Result};
 use serde::{Deserialize, Serialize};
 
+/// Name of the view layer in files with Blender's names.
+pub const VIEW_LAYER: &str = "ViewLayer";
+
 /// Naming scheme of the channels of an EXR.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
@@ -32,13 +35,21 @@ impl Naming {
         }
     }
 
+    /// The name of the view layer in a file of Blender whose layers have been read, if it is not the usual one and the
+    /// file has no other picture.
+    pub fn view_layer(set: &LayerSet) -> Option<String> {
+        let mut pictures = set.layers.iter().filter(|layer| layer.name.is_empty() || layer.name.ends_with("Combined"));
+        let name = pictures.next()?.name.strip_suffix(".Combined")?;
+        (pictures.next().is_none() && name != VIEW_LAYER).then(|| name.to_owned())
+    }
+
     /// Name of the layer in a file, without component; `name` is its plain name.
     pub fn layer(self, name: &str) -> String {
         match self {
             Naming::Plain => name.to_owned(),
             Naming::Blender => {
                 let pass = kind_of(name).and_then(|(kind, _)| kind.blender).unwrap_or(name);
-                format!("ViewLayer.{pass}")
+                format!("{VIEW_LAYER}.{pass}")
             }
         }
     }

@@ -137,6 +137,14 @@ pub struct Finished {
     pub clamped: Clamped,
 }
 
+/// A combination of bandwidth levels by a network.
+struct Combination {
+    /// Number of the levels.
+    levels: usize,
+    /// The estimate before.
+    noisy: Picture,
+}
+
 /// An estimate that [`Finish::deliver`] finishes.
 pub struct Prepared {
     estimate: Estimate,
@@ -372,13 +380,12 @@ impl Finish {
         Ok((estimate, planes))
     }
 
-    /// [`guided`](Self::guided), and if a network has combined bandwidth levels to the estimate, their number and the
-    /// estimate before.
-    fn estimate(&mut self, set: &LayerSet) -> Result<(Estimate, Option<Planes>, Option<(usize, Picture)>)> {
+    /// [`guided`](Self::guided), and what a network has done if it has combined bandwidth levels to the estimate.
+    fn estimate(&mut self, set: &LayerSet) -> Result<(Estimate, Option<Planes>, Option<Combination>)> {
         let (mut estimate, planes) = self.guided(set)?;
         let Some(combiner) = &mut self.combiner else { return Ok((estimate, planes, None)) };
         let noisy = std::mem::replace(&mut estimate.mean, combiner.run(&LevelStack::of(set)?)?);
-        Ok((estimate, planes, Some((combiner.metadata().levels, noisy))))
+        Ok((estimate, planes, Some(Combination { levels: combiner.metadata().levels, noisy })))
     }
 
     /// Finishes the picture of the layer set and makes the result its beauty; alpha stays. Adds `Error`,
@@ -400,7 +407,7 @@ impl Finish {
         let others = names.into_iter().filter(|name| effects.iter().all(|(effect, _)| effect != name));
         let parts = others.filter_map(|name| set.picture(&name).map(|picture| (name, picture))).collect();
         let error = ErrorSource::of(set, own_level(set));
-        let (combined, noisy) = combined.unzip();
+        let (combined, noisy) = combined.map(|Combination { levels, noisy }| (levels, noisy)).unzip();
         let prepared = Prepared { estimate, denoised, half, combined, noisy, effects, parts, colors: lobe_colors(set) };
         self.deliver(prepared, error, wanted)?.insert_into(set)
     }
@@ -452,7 +459,7 @@ impl Finish {
         }
         let denoised = self.denoised(&estimate, &effects, planes.as_ref())?;
         let is_denoised = !matches!(self.denoiser, Denoiser::None);
-        let combined = combined.map(|(levels, _)| levels);
+        let combined = combined.map(|combination| combination.levels);
         let pictures = temporal::Pictures { estimate, denoised, half, combined, is_denoised };
         Ok(temporal::Frame::new(pictures, parts, motion, correlation))
     }
@@ -487,7 +494,7 @@ impl Finish {
         drop(denoised);
         let noise = self.noise(&estimate, &spread);
         let sum = noisy.as_ref().or(combined.is_none().then_some(&estimate.mean));
-        let parts = self.parts(effects, parts, sum, &colors, &picture, noise, wanted)?;
+        let parts = self.parts((effects, parts), sum, &colors, &picture, noise, wanted)?;
         let account = Finished { combined, error, error_map: error_map.flatten(), clamped };
         Ok(FinishedPicture { picture, parts, account })
     }

@@ -1,9 +1,10 @@
 //! Reads the EXR of a render to finish it.
 
 use crate::error::Result;
-use crate::film::{LayerSet, Naming, ascii_json, current_name, plain_name, take_plain_names};
+use crate::film::{LayerSet, Naming, VIEW_LAYER, ascii_json, current_name, plain_name, take_plain_names};
 use crate::image::exr::{self, Attributes};
 use serde_json::{Map, Value};
+use std::borrow::Cow;
 use std::path::Path;
 
 /// The EXR of a render of this or another program.
@@ -40,10 +41,18 @@ impl RenderedFile {
     /// # Errors
     /// As for [`exr::read`].
     pub fn read_layers(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<RenderedFile> {
-        Ok(RenderedFile::of(path, exr::read_render(path, |name| wanted(&current_name(plain_name(name))))?))
+        let view = Naming::view_layer(&exr::read_header(path)?.0);
+        let wanted = |name: &str| wanted(&current_name(plain_name(&in_view_layer(name, view.as_deref()))));
+        Ok(RenderedFile::of(path, exr::read_render(path, wanted)?))
     }
 
     fn of(path: &Path, (mut set, mut attributes): (LayerSet, Attributes)) -> RenderedFile {
+        let view = Naming::view_layer(&set);
+        if let Some(view) = &view {
+            set.layers.iter_mut().for_each(|layer| layer.name = in_view_layer(&layer.name, Some(view)).into_owned());
+            let names = attributes.texts.iter_mut().filter(|(name, _)| name.starts_with("cryptomatte/"));
+            names.for_each(|(_, text)| *text = in_view_layer(text, Some(view)).into_owned());
+        }
         let naming = Naming::of(&set);
         let remark = |name: String| {
             format!("{}: layer \"{name}\" cannot be written under this name and is left out", path.display())
@@ -53,11 +62,20 @@ impl RenderedFile {
             frame.world_to_camera = naming.from_own_axes(frame.world_to_camera);
             frame.world_to_ndc = frame.world_to_ndc.map(|matrix| naming.from_own_axes(matrix));
         }
+        if let Some(view) = view {
+            remarks.push(format!("{}: the view layer \"{view}\" will be called {VIEW_LAYER}", path.display()));
+        }
         for name in take_ascii(&mut attributes) {
             remarks.push(format!("{}: attribute \"{name}\" is not ASCII and is left out", path.display()));
         }
         RenderedFile { set, attributes, naming, remarks }
     }
+}
+
+/// The name of a layer in a file whose view layer has another name than usual, as it would be with the usual one.
+fn in_view_layer<'n>(name: &'n str, view: Option<&str>) -> Cow<'n, str> {
+    let pass = view.and_then(|view| name.strip_prefix(view)?.strip_prefix('.'));
+    pass.map_or(Cow::Borrowed(name), |pass| format!("{VIEW_LAYER}.{pass}").into())
 }
 
 /// Makes all attributes ASCII, which EXR headers require: objects of JSON, such as the names of a cryptomatte, by escapes.

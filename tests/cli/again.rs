@@ -147,6 +147,28 @@ fn text_that_is_not_ascii_is_left_out() {
     assert_eq!(attributes.texts["names"], "{\"k\\u00f6rper\": 1}");
 }
 
+/// The view layer of a file of Blender may have any name.
+#[test]
+fn view_layers_of_other_names_are_finished() {
+    let folder = Folder::new();
+    let options = "--method path --iterations 2 --no-finish --exr-naming blender";
+    done(&folder.run(&format!("{COMMON} {options} -o own.exr")));
+    let mut bytes = std::fs::read(folder.path("own.exr")).expect("it is there");
+    let at = |bytes: &[u8]| bytes.windows(9).position(|window| window == b"ViewLayer");
+    while let Some(at) = at(&bytes) {
+        bytes[at..at + 9].copy_from_slice(b"Main.0001");
+    }
+    std::fs::write(folder.path("other.exr"), bytes).expect("it can be written");
+    for name in ["own", "other"] {
+        let outcome = folder.run(&format!("finish {name}.exr -o {name}.out.exr --denoise own"));
+        done(&outcome);
+        let warning = "warning: other.exr: the view layer \"Main.0001\" will be called ViewLayer\n";
+        assert_eq!(outcome.stderr.contains(warning), name == "other", "{}", outcome.stderr);
+    }
+    let read = |name: &str| std::fs::read(folder.path(name)).expect("it is there");
+    assert!(read("own.out.exr") == read("other.out.exr"));
+}
+
 /// The bytes with the first occurrence of some replaced by as many others.
 fn replaced(bytes: &[u8], old: &[u8], new: &[u8]) -> Vec<u8> {
     assert_eq!(old.len(), new.len());

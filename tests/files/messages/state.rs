@@ -13,6 +13,7 @@ use caustique::scene::converter::answer;
 use serde_json::json;
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 fn refused<T>(outcome: Result<T>) -> Vec<String> {
     vec![message(&outcome.err().expect("it is refused"))]
@@ -92,6 +93,10 @@ fn checkpoints(said: &mut Said, folder: &Path) {
     fs::write(&path, b"glTF").expect("it can be written");
     let refusal = checkpoint::check_replaceable(&path, true, "add --resume");
     said.case("another file where a checkpoint would be saved", &refused(refusal));
+    let pipe = folder.join("pipe");
+    assert!(Command::new("mkfifo").arg(&pipe).status().is_ok_and(|status| status.success()));
+    let refusal = checkpoint::check_replaceable(&pipe, true, "add --resume");
+    said.case("a pipe where a checkpoint would be saved", &refused(refusal));
     said.case("a checkpoint of other options", &refused(checkpoint::check(&path, &own, Some(""), &other)));
 }
 
