@@ -106,8 +106,8 @@ impl OpenFinish {
         &mut self.finish
     }
 
-    /// Chooses the quality of the denoiser for a render with a time limit, and returns the seconds that the finish will
-    /// take. Both follow from timing the denoiser on a small picture. The clock decides when the render ends and how
+    /// Chooses the quality of the denoiser for a render with a time limit, and returns the seconds that the choice has
+    /// taken and the finish will take. Both follow from timing the denoiser on a small picture. The clock decides when the render ends and how
     /// well its one picture is denoised, nothing else.
     ///
     /// `limit`: seconds of the render; `pixels`: of the picture; `parts`: finished parts besides the picture.
@@ -115,6 +115,7 @@ impl OpenFinish {
     /// # Errors
     /// The denoiser fails.
     pub fn reserve_time(&mut self, limit: f64, pixels: usize, parts: usize) -> Result<f64> {
+        let timing = Clock::start();
         let has_qualities = self.finish.has_qualities();
         let small = Size { width: TIMED_SIDE, height: TIMED_SIDE };
         let mut time = |run: &dyn Fn(&mut Finish) -> Result<()>| -> Result<f64> {
@@ -141,7 +142,7 @@ impl OpenFinish {
         self.finish.quality = picture.0;
         // The guides, the picture, the half of its iterations that gives its error, and its parts.
         let seconds = guides + 2.0 * (picture.1 + network) + fast * parts as f64;
-        Ok(seconds.min(MAX_FINISH_SHARE * limit))
+        Ok((timing.seconds() + seconds).min(MAX_FINISH_SHARE * limit))
     }
 
     /// Finishes a preview: at the lowest quality, without a bound, without its error and its parts.

@@ -3,7 +3,7 @@
 use super::checkpoint::{self, Head};
 use super::load::Environment;
 use super::request::Request;
-use crate::error::Result;
+use crate::error::{Error, ErrorKind, Result};
 use crate::render::{Settings, State};
 use crate::scene::Scene;
 
@@ -20,7 +20,7 @@ impl Resumption {
     /// Reads the checkpoint of a request, if it names one, and checks that it belongs to the render.
     ///
     /// # Errors
-    /// The checkpoint cannot be read, or belongs to another render.
+    /// The checkpoint cannot be read, belongs to another render, or has more iterations than the request.
     pub fn read(request: &Request, scene: &Scene, settings: &Settings) -> Result<Resumption> {
         let Some(path) = &request.resume else {
             let is_stored = request.saving.is_some() || settings.is_shard();
@@ -30,6 +30,12 @@ impl Resumption {
         let scene = hash(request, scene)?;
         let (head, state) = checkpoint::read(path)?;
         checkpoint::check(path, &head, scene.as_deref(), &request.arguments)?;
+        let done = state.iterations();
+        if let Some(asked) = settings.iterations_of_shard().filter(|asked| *asked < done) {
+            let cause = format!("has {done} iterations already, and --iterations asks for {asked}");
+            let error = Error::new(ErrorKind::Usage, path.display(), cause);
+            return Err(error.hint("ask for more, or start anew without --resume"));
+        }
         Ok(Resumption { scene, saved: Some((head, state)) })
     }
 }

@@ -22,6 +22,8 @@ const FREE_OPTIONS: [&str; 9] =
 struct Source {
     path: PathBuf,
     header: Value,
+    /// Seeds of the renders that it is the mean of: one, unless it was merged itself.
+    seeds: Vec<u64>,
     iterations: u64,
 }
 
@@ -141,14 +143,22 @@ impl Seeds {
                 return Err(error(cause).hint("merge renders of one scene"));
             }
         }
-        let same = |other: &&Source| other.header["seed"] == header["seed"] || header["seed"].is_null();
-        if let Some(other) = self.sources.iter().find(same) {
-            let cause =
-                format!("has the seed {} as {} has: the same noise twice", header["seed"], other.path.display());
+        let seeds = match header["merged"]["seeds"].as_array() {
+            Some(seeds) => seeds.iter().map(Value::as_u64).collect(),
+            None => header["seed"].as_u64().map(|seed| vec![seed]),
+        };
+        let Some(seeds) = seeds.filter(|seeds: &Vec<u64>| !seeds.is_empty()) else {
+            return Err(
+                error("does not say from which seeds it was merged".into()).hint("merge the renders themselves")
+            );
+        };
+        let shared = |other: &Source| seeds.iter().copied().find(|seed| other.seeds.contains(seed));
+        if let Some((other, seed)) = self.sources.iter().find_map(|other| Some((other, shared(other)?))) {
+            let cause = format!("has the seed {seed} as {} has: the same noise twice", other.path.display());
             return Err(error(cause).hint("render each with another --seed"));
         }
         let iterations = header["iterations"].as_u64().unwrap_or(0);
-        Ok(Source { path: path.into(), header, iterations })
+        Ok(Source { path: path.into(), header, seeds, iterations })
     }
 
     fn add_mattes(&mut self, set: &LayerSet, iterations: f64) {
@@ -198,7 +208,8 @@ impl Seeds {
         }
         let own = sources.first().and_then(|source| source.header["levels"].as_u64()).unwrap_or(1).max(2) - 1;
         if !have_finished_errors(&sources) {
-            set_error_of_mean(&mut set, &format!("Variance{own}"), sources.len());
+            let renders = sources.iter().map(|source| source.seeds.len()).sum();
+            set_error_of_mean(&mut set, &format!("Variance{own}"), renders);
         } else if let Some(error) = set.layers.iter_mut().find(|layer| layer.name == "Error") {
             error.planes.iter_mut().flat_map(|plane| &mut plane.values).for_each(|square| *square = square.sqrt());
         }
@@ -300,7 +311,7 @@ fn header(sources: &[Source], total: u64) -> Value {
     ["accuracy", "error_noisy", "worst"].iter().for_each(|key| drop(header.remove(*key)));
     header.extend(unseen(sources).map(|unseen| ("unseen".to_owned(), unseen)));
     let names: Vec<String> = sources.iter().map(|source| source.path.display().to_string()).collect();
-    let seeds: Vec<&Value> = sources.iter().map(|source| &source.header["seed"]).collect();
+    let seeds: Vec<u64> = sources.iter().flat_map(|source| source.seeds.iter().copied()).collect();
     header.insert("merged".into(), json!({"renders": names, "seeds": seeds, "weights": "iterations"}));
     header.into()
 }

@@ -69,6 +69,41 @@ fn merged_seeds_are_finished_like_their_file() {
     }
 }
 
+/// A merged file brings the seeds of its renders with it.
+#[test]
+fn no_seed_is_merged_twice() {
+    let folder = Folder::new();
+    for seed in [1, 2, 3] {
+        done(&folder.run(&format!("{COMMON} --method path --iterations 2 --seed {seed} -o {seed}.exr")));
+    }
+    done(&folder.run("merge 1.exr 2.exr -o both.exr"));
+    for (inputs, second, first) in [("both.exr 2.exr", "2.exr", "both.exr"), ("2.exr both.exr", "both.exr", "2.exr")] {
+        let refused = folder.run(&format!("merge {inputs} -o merged.exr"));
+        let error = format!("{second}: has the seed 2 as {first} has: the same noise twice\n");
+        assert_eq!(refused.code, Some(2), "{}", refused.stderr);
+        assert!(refused.stderr.starts_with(&error), "{}", refused.stderr);
+    }
+    for inputs in ["both.exr 3.exr", "3.exr both.exr"] {
+        done(&folder.run(&format!("merge {inputs} -o merged.exr")));
+        let (_, header) = folder.read("merged.exr");
+        let seeds = header["merged"]["seeds"].as_array().expect("a list of seeds");
+        assert!((1..=3).all(|seed: u64| seeds.contains(&seed.into())) && seeds.len() == 3, "{seeds:?}");
+        assert_eq!(header["iterations"], 6);
+    }
+}
+
+/// A checkpoint with more iterations than are asked for is not ended early, and stays.
+#[test]
+fn a_checkpoint_is_not_ended_by_fewer_iterations() {
+    let folder = Folder::new();
+    done(&folder.run(&format!("{COMMON} --method path --iterations 6 -o a.exr --checkpoint state")));
+    let refused = folder.run(&format!("{COMMON} --method path --iterations 4 -o b.exr --resume state"));
+    let error = "state: has 6 iterations already, and --iterations asks for 4\n\
+                 hint: ask for more, or start anew without --resume\n";
+    assert_eq!((refused.code, refused.stderr.as_str()), (Some(2), error));
+    assert!(folder.path("state").exists() && !folder.path("b.exr").exists());
+}
+
 #[test]
 fn renders_of_two_scenes_are_not_merged() {
     let folder = Folder::new();

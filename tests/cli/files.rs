@@ -12,6 +12,22 @@ fn without_output_the_picture_is_beside_the_scene() {
     let outcome = folder.render("--iterations 2 --no-finish");
     assert!(outcome.stderr.starts_with("no --output: writing scene.exr and scene.png\n"), "{}", outcome.stderr);
     assert_eq!(folder.files(), ["scene.exr", "scene.png"]);
+    let again = folder.run("render scene.glb --width 8 --iterations 1 --method path --progress none");
+    assert_eq!(again.code, Some(0), "{}", again.stderr);
+    for lost in ["scene.exr", "scene.png"] {
+        for name in folder.files() {
+            std::fs::remove_file(folder.path(&name)).expect("it can be removed");
+        }
+        std::fs::write(folder.path(lost), "of another program").expect("it can be written");
+        let refused = folder.run("render scene.glb --width 8 --iterations 1 --method path --progress none");
+        let error =
+            "is there, and may be no render of this program\nhint: name the picture with --output, or move this one\n";
+        assert_eq!(refused.code, Some(2), "{}", refused.stderr);
+        assert!(refused.stderr.ends_with(&format!("{lost}: {error}")), "{}", refused.stderr);
+        assert_eq!(std::fs::read(folder.path(lost)).expect("it is there"), b"of another program");
+    }
+    std::fs::remove_file(folder.path("scene.png")).expect("it can be removed");
+    folder.render("--iterations 2 --no-finish");
     let refused = folder.run("render none.glb");
     assert!(refused.code != Some(0) && !refused.stderr.contains("no --output"), "{}", refused.stderr);
     folder.render("--iterations 2 --no-finish --frames 3 --png look.####.png");

@@ -290,6 +290,48 @@ fn objects_that_do_not_block_a_light_do_not_exist_for_it() {
     }
 }
 
+/// Where a solid that does not block a light fills the space, the light meets what would be there without the solid: the
+/// medium of the scene, and solids of less priority, which absorb or block it.
+#[test]
+fn solids_that_do_not_block_a_light_leave_what_else_is_there() {
+    let settings = Settings { max_depth: 2, iterations: Some(64), ..settings(Method::Path) };
+    let slab = |low: f32, high: f32| cuboid(Vec3::new(-7.0, low, -7.0), Vec3::new(7.0, high, 7.0), false);
+    let absorbing = |sigma: f32| MediumParameters { sigma_a: Rgb::splat(sigma), sigma_s: Rgb::ZERO, g: 0.0 };
+    let around = |ior: f32, medium| Material { priority: 2, medium, ..glass(ior) };
+    let inside = |ior: f32, medium| Material { priority: 1, medium, ..glass(ior) };
+    type Case<'a> = (&'a str, Option<MediumParameters>, Option<Material>, Material);
+    let cases: [Case<'_>; 4] = [
+        ("fog and glass", Some(absorbing(0.5)), None, around(1.5, None)),
+        ("fog and an absorbing solid", Some(absorbing(0.5)), None, around(1.5, Some(absorbing(3.0)))),
+        ("a drink", None, Some(inside(1.0, Some(absorbing(1.0)))), around(1.5, None)),
+        ("glass in glass", None, Some(inside(1.5, None)), around(1.0, Some(absorbing(3.0)))),
+    ];
+    for kind in ["point", "ball", "panel"] {
+        for (name, medium, nested, screen) in &cases {
+            let picture = |passes: bool| {
+                let links = passed(&["screen", kind]);
+                let scene = screened(matte(0.5, 0.0), kind, links, |scene| {
+                    scene.medium = *medium;
+                    if let Some(nested) = nested {
+                        put(scene, "nested", slab(1.0, 1.3), nested.clone());
+                    }
+                    if passes {
+                        put(scene, "screen", slab(0.8, 1.5), screen.clone());
+                    }
+                });
+                picture(&scene, &settings, 8)
+            };
+            let [without, with] = [false, true].map(picture);
+            let scale = without.iter().map(|pixel| pixel.y).sum::<f64>() / without.len() as f64;
+            assert_eq!(scale > 0.0, *name != "glass in glass", "{kind}, {name}");
+            for (index, (without, with)) in without.iter().zip(&with).enumerate() {
+                let what = format!("{kind}, {name}, pixel {index}: {with} instead of {without}");
+                assert!((*without - *with).abs().max_element() <= 1e-3 * (without.max_element() + scale), "{what}");
+            }
+        }
+    }
+}
+
 /// An object that does not block the light of a light receives it all the same, and lights other objects.
 #[test]
 fn objects_that_do_not_block_a_light_receive_it() {

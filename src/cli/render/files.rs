@@ -123,6 +123,27 @@ pub fn check_inputs(args: &RenderArgs, outputs: &Outputs, scene: &Scene) -> Resu
     }
 }
 
+/// Checks that files whose names the user has not given replace renders of this program alone: beside a scene lie pictures
+/// of the program that made it.
+///
+/// # Errors
+/// One of the files is another one.
+pub fn check_defaults(args: &RenderArgs) -> Result<()> {
+    if !args.names_are_default {
+        return Ok(());
+    }
+    let is_own = || exr::read_header(&args.output).is_ok_and(|(_, attributes)| attributes.object().is_some());
+    let png = args.picture.png.as_ref().filter(|png| **png == args.output.with_extension("png"));
+    let other = match args.output.is_file() {
+        true => Some(&args.output).filter(|_| !is_own()),
+        false => png.filter(|png| png.is_file()),
+    };
+    other.map_or(Ok(()), |other| {
+        let error = Error::new(ErrorKind::Usage, other.display(), "is there, and may be no render of this program");
+        Err(error.hint("name the picture with --output, or move this one"))
+    })
+}
+
 /// Removes the files that a killed process has left beside the finished files of a render.
 pub fn remove_leftovers(args: &RenderArgs) {
     frame_outputs(args).iter().for_each(|path| atomic::remove_leftovers(path));

@@ -82,6 +82,7 @@ fn check(args: &RenderArgs) -> Result<Request> {
     let layers = args.selection()?;
     output::check_render(&args.output)?;
     args.picture.check()?;
+    files::check_defaults(args)?;
     files::check_usd_layer(args)?;
     args.preview.as_ref().map_or(Ok(()), Target::check)?;
     files::check_checkpoint(args)?;

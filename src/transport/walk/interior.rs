@@ -172,10 +172,16 @@ impl Interior {
     #[cold]
     #[inline(never)]
     fn decide(self, scene: &Scene, token: u32) -> Interior {
+        self.limited(scene, |instance| scene.starts_in_solid(instance, token))
+    }
+
+    /// These solids, of which those of the instances for which `exists` is false are absent.
+    #[cold]
+    #[inline(never)]
+    pub fn limited(self, scene: &Scene, exists: impl Fn(u32) -> bool) -> Interior {
         let mut decided = Interior::default();
         let mut push = |entry: u32| {
-            let exists = scene.starts_in_solid(entry & !ABSENT, token);
-            decided.push(scene, if exists { entry } else { entry | ABSENT });
+            decided.push(scene, if exists(entry & !ABSENT) { entry } else { entry | ABSENT });
         };
         let mut outer = SmallVec::<[u32; 8]>::new();
         self.for_each_outer(scene, |entry| outer.push(entry));
@@ -203,7 +209,7 @@ impl Interior {
             let solid = scene.alpha_solids[(entry & !ABSENT) as usize];
             if entry & ABSENT == 0 {
                 chance *= solid.chance;
-            } else {
+            } else if solid.chance < 1.0 {
                 chance *= 1.0 - solid.chance;
                 absent ^= solid.code;
             }

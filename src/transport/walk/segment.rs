@@ -231,7 +231,8 @@ fn boundary(
         return Boundary::None(Rgb::splat(ratio * ratio), crossing.interior);
     }
     if passes_unlinked_solids(scene, token) && !blocks(scene, token, surface.instance) {
-        return Boundary::None(Rgb::ONE, crossing.interior);
+        let behind = interior.pass_absent(scene, surface.instance, entering);
+        return Boundary::None(Rgb::ONE, behind.unwrap_or(crossing.interior));
     }
     // A surface that emits light is never skipped.
     if crossing.is_nothing() && !material.emits() {
@@ -289,7 +290,7 @@ fn passes_hidden_solids(scene: &Scene, token: u32) -> bool {
 }
 
 /// Whether the ray of a token is a shadow ray to a light with shadow linking, in a scene with solids that do not block
-/// such light. The ray crosses their boundaries straight, and meets no medium where such a solid fills the space.
+/// such light. These solids do not exist for the ray, which crosses their boundaries straight.
 #[inline(always)]
 fn passes_unlinked_solids(scene: &Scene, token: u32) -> bool {
     scene.survey.unlinked_solids && token & LINKING_BITS != 0
@@ -524,6 +525,10 @@ pub fn shadow_ray(scene: &Scene, between: &ShadowRay) -> Visibility {
 fn trace_through_boundaries(scene: &Scene, between: &ShadowRay) -> Visibility {
     let ShadowRay { start: Start { origin, direction, mut interior, leaving, token }, tmax, reaching, .. } = *between;
     let to_lens = between.to_lens;
+    if passes_unlinked_solids(scene, token) {
+        let exists = |solid| blocks(scene, token, solid) || between.destination == Destination::Inside(solid);
+        interior = interior.limited(scene, exists);
+    }
     let mut along = RaySurfaces::new(Ray { origin, direction, tmax, token }, leaving);
     let mut visibility = Visibility::CLEAR;
     let [mut starts, ends] = between.in_medium;
