@@ -71,9 +71,9 @@ impl Finish {
     }
 
     /// The finished parts of the picture whose names are wanted, with their layers' names, from effects that are denoised
-    /// already and from other parts. Parts that together sum to
-    /// the picture, or to its caustics, are all finished if one of them is wanted. `sum` is the estimate that they sum to
-    /// with the light of parts that are missing; `None` if it is unknown.
+    /// already and from other parts. Parts that together sum to the picture, or to its caustics, are all finished if one
+    /// of them is wanted. `sum` is the estimate that they sum to with the light of parts that are missing; `None` if it
+    /// is unknown.
     pub(super) fn parts(
         &mut self,
         (mut effects, parts): (Vec<NamedPart>, Vec<Named>),

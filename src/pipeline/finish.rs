@@ -107,8 +107,8 @@ impl OpenFinish {
     }
 
     /// Chooses the quality of the denoiser for a render with a time limit, and returns the seconds that the choice has
-    /// taken and the finish will take. Both follow from timing the denoiser on a small picture. The clock decides when the render ends and how
-    /// well its one picture is denoised, nothing else.
+    /// taken and the finish will take. Both follow from timing the denoiser on a small picture. The clock decides when
+    /// the render ends and how well its one picture is denoised, nothing else.
     ///
     /// `limit`: seconds of the render; `pixels`: of the picture; `parts`: finished parts besides the picture.
     ///

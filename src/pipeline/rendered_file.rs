@@ -25,7 +25,11 @@ impl RenderedFile {
     /// # Errors
     /// As for [`exr::read`].
     pub fn read(path: &Path) -> Result<RenderedFile> {
-        RenderedFile::read_layers(path, |_| true)
+        let mut file = RenderedFile::read_layers(path, |_| true)?;
+        if exr::has_overscan(path)? {
+            file.remarks.push(format!("{}: what lies outside of its display window is left out", path.display()));
+        }
+        Ok(file)
     }
 
     /// The header of a file: its layers lack their values. Reads no pixels.

@@ -182,6 +182,26 @@ fn text_that_is_not_ascii_is_left_out() {
     assert_eq!(attributes.texts["names"], "{\"k\\u00f6rper\": 1}");
 }
 
+/// Pixels outside of the display window are not finished, and the user learns that.
+#[test]
+fn overscan_is_left_out_with_a_warning() {
+    let folder = Folder::new();
+    done(&folder.run(&format!("{COMMON} --method path --iterations 2 --no-finish --crop 10,5,20,12 -o own.exr")));
+    let bytes = std::fs::read(folder.path("own.exr")).expect("it is there");
+    // The display window, from (0, 0) to (39, 23), ends within the data window.
+    let window = |x: i32, y: i32| [0, 0, x, y].map(i32::to_le_bytes).concat();
+    std::fs::write(folder.path("other.exr"), replaced(&bytes, &window(39, 23), &window(24, 23)))
+        .expect("it can be written");
+    for name in ["own", "other"] {
+        let outcome = folder.run(&format!("finish {name}.exr -o {name}.out.exr --denoise own"));
+        done(&outcome);
+        let warning = "warning: other.exr: what lies outside of its display window is left out\n";
+        assert_eq!(outcome.stderr.contains(warning), name == "other", "{}", outcome.stderr);
+    }
+    let kept = exr::read_window(&folder.path("other.out.exr")).expect("it can be read").0.set;
+    assert_eq!((kept.width, kept.height), (15, 12));
+}
+
 /// The view layer of a file of Blender may have any name.
 #[test]
 fn view_layers_of_other_names_are_finished() {

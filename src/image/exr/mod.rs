@@ -14,7 +14,7 @@ mod zip;
 use std::collections::BTreeMap;
 
 pub use colour_space::ColourSpace;
-pub use read::{read, read_header, read_layers, read_render, read_window};
+pub use read::{has_overscan, read, read_header, read_layers, read_render, read_window};
 pub use whole::check_whole;
 pub use write::{Compression, Options, write, write_draft, write_followed};
 

@@ -86,7 +86,6 @@ impl Extent {
         if self == Extent::Display || (self == Extent::OwnData && !is_own()) {
             return Ok(display);
         }
-        let range = |position: i32, size: usize| [i64::from(position), i64::from(position) + size as i64];
         let axis = |of: fn(Vec2<i32>) -> i32, size: fn(Vec2<usize>) -> usize| {
             let [low, high] = range(of(display.position), size(display.size));
             let data = headers.iter().map(|part| range(of(part.own_attributes.layer_position), size(part.layer_size)));
@@ -97,6 +96,29 @@ impl Extent {
         let ((x, width), (y, height)) = (axis(|at| at.0, |size| size.0), axis(|at| at.1, |size| size.1));
         Ok(IntegerBounds { position: Vec2(x, y), size: Vec2(width, height) })
     }
+}
+
+/// The coordinates of a window along an axis: of its first pixel, and of the one after its last.
+fn range(position: i32, size: usize) -> [i64; 2] {
+    [i64::from(position), i64::from(position) + size as i64]
+}
+
+/// Whether a part of an EXR has pixels outside of the display window, which are not read.
+///
+/// # Errors
+/// As for [`read_header()`].
+pub fn has_overscan(path: &Path) -> Result<bool> {
+    let ranges = |at: Vec2<i32>, size: Vec2<usize>| [range(at.0, size.0), range(at.1, size.1)];
+    open(path, |file, _| {
+        let reader = exr::block::read(file, false)?;
+        let beyond = |header: &Header| {
+            let display = header.shared_attributes.display_window;
+            let own = ranges(header.own_attributes.layer_position, header.layer_size);
+            let all = ranges(display.position, display.size);
+            own.iter().zip(all).any(|(own, all)| own[0] < all[0] || own[1] > all[1])
+        };
+        Ok(reader.headers().iter().any(beyond))
+    })
 }
 
 /// The layers of an EXR without values as [`read_render()`] reads them, and the attributes. Reads no pixels, so that a file
