@@ -36,7 +36,7 @@ RUNS = {
     "deep-multi": ["--pairs", "deep-multi", "--methods", "sppm", "--paths", 1, *STEPS],
 }
 # The run of the network of the finish.
-FINISH_RUNS = {"finish": ["--side", 96, "--batch", 8, "--rate", 1e-3, "--steps", 24_000]}
+FINISH_RUNS = {"finish": ["--side", 96, "--batch", 8, "--rate", 1e-3, "--steps", 100_000]}
 UNLIMITED = 10**9
 # Minutes of a run before it is the next one's turn.
 TURN = 20.0
