@@ -9,9 +9,8 @@ use caustique::argument::threads;
 use caustique::error::{Error, Result};
 use caustique::image::{Outputs, exr};
 use caustique::options::{FinishOptions, Frames, path_of_frame};
-use caustique::pipeline::{RenderedFile, forget_error, write_finish};
+use caustique::pipeline::{RenderedFile, header_to_finish, write_finish};
 use caustique::render::Clock;
-use serde_json::json;
 use std::path::PathBuf;
 
 /// Finish a rendered EXR as 'caustique render' finishes its own
@@ -64,8 +63,7 @@ pub fn run(args: &FinishArgs) -> Result<()> {
         let (mut opened, RenderedFile { mut set, mut attributes, naming, remarks }) = (opened?, file?);
         remarks.iter().for_each(|remark| say(&format!("warning: {remark}")));
         let clock = Clock::start();
-        let mut object = attributes.object().unwrap_or_else(|| json!({"version": env!("CARGO_PKG_VERSION")}));
-        forget_error(&mut object, &mut set);
+        let mut object = header_to_finish(&attributes, &mut set);
         let finish = || opened.finish().apply(&mut set, |_| true);
         let account =
             Form::Auto.during("finishing the picture", finish).map_err(|error| error.within(args.input.display()))?;

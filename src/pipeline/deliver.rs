@@ -303,8 +303,8 @@ impl Reached {
         Some(self.iterations_to_half()? * self.pace(|moment| moment.seconds))
     }
 
-    /// Mean cost of an iteration, in the unit of `spent`. What came before the first moment of the history, such as a
-    /// pilot, is not needed again, so it does not count where the history has two moments.
+    /// Mean cost of an iteration, in the unit of `spent`. A pilot precedes the first moment of the history and is not
+    /// repeated, so it does not count if the history has two moments.
     fn pace(&self, spent: impl Fn(&HistoryEntry) -> f64) -> f64 {
         let (first, last) = (self.history.first().unwrap_or(&self.last), &self.last);
         match last.iterations.saturating_sub(first.iterations) {
@@ -382,26 +382,28 @@ fn write_error(header: &mut Map<String, Value>, finished: &Finished) {
     }
 }
 
-/// Removes from a stored picture, before it is finished anew, the error of the picture that it was finished to: a finish
-/// without quarters does not replace it.
-pub fn forget_error(header: &mut Value, set: &mut LayerSet) {
-    let Some(header) = header.as_object_mut().filter(|header| header.get("error_of") == Some(&FINISHED_PICTURE.into()))
-    else {
-        return;
-    };
-    set.layers.retain(|layer| layer.name != ERROR);
-    header.remove("accuracy");
-    header.remove("worst");
-    let noisy = header.remove("error_noisy").unwrap_or(Value::Null);
-    header.insert("error".into(), noisy);
-    header.insert("error_of".into(), "Noisy".into());
+/// The header of a stored picture that will be finished anew. It has no error of the picture that it was finished to, and
+/// the layers lose theirs, because a finish without quarters does not replace it.
+pub fn header_to_finish(attributes: &Attributes, set: &mut LayerSet) -> Value {
+    let mut header = attributes.object().unwrap_or_else(|| json!({"version": env!("CARGO_PKG_VERSION")}));
+    if header["error_of"] == FINISHED_PICTURE
+        && let Some(header) = header.as_object_mut()
+    {
+        set.layers.retain(|layer| layer.name != ERROR);
+        header.remove("accuracy");
+        header.remove("worst");
+        let noisy = header.remove("error_noisy").unwrap_or(Value::Null);
+        header.insert("error".into(), noisy);
+        header.insert("error_of".into(), "Noisy".into());
+    }
+    header
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// What came before the first iteration is not charged again.
+    /// Halving the error costs more iterations, and no second pilot.
     #[test]
     fn halving_costs_iterations_alone() {
         let moment = |iterations: u64, seconds: f64, finished: Option<FinishedError>| HistoryEntry {

@@ -41,7 +41,7 @@ mod slow_iteration;
 pub mod temporal;
 mod worst;
 
-pub use deliver::{Delivery, FINISHED_PICTURE, Reached, forget_error, write_finish};
+pub use deliver::{Delivery, FINISHED_PICTURE, Reached, header_to_finish, write_finish};
 pub use facts::SceneFacts;
 pub use finish::{FinishRequest, OpenFinish};
 pub use forecast::{Forecast, forecast};

@@ -1,6 +1,6 @@
 //! The temporal finish of files: reads the frames of an animation around each frame, and finishes them together.
 
-use super::deliver::{forget_error, write_finish};
+use super::deliver::{header_to_finish, write_finish};
 use super::finish::OpenFinish;
 use super::rendered_file::RenderedFile;
 use crate::error::{Error, ErrorKind, Result};
@@ -97,9 +97,7 @@ impl FrameFiles {
         let error = ErrorSource::read(&header, |names| self.layers(number, names))?;
         let picture = finish.finish().deliver(average, error, wanted).map_err(within)?;
         let mut file = RenderedFile::read_layers(&path, |name| !picture.replaces(name))?;
-        let object = file.attributes.object();
-        let mut object = object.unwrap_or_else(|| json!({"version": env!("CARGO_PKG_VERSION")}));
-        forget_error(&mut object, &mut file.set);
+        let mut object = header_to_finish(&file.attributes, &mut file.set);
         let finished = picture.insert_into(&mut file.set).map_err(within)?;
         // Replaced layers keep their places, except the error.
         let place = |layer: &Layer| header.layers.iter().position(|old| old.name == layer.name && layer.name != ERROR);

@@ -58,11 +58,11 @@ def spread(mean, deviation, samples, alpha=None):
     known = np.where(np.isfinite(deviation), np.maximum(deviation, 0), np.inf).astype(np.float32)
     brightest = np.maximum(mean.max(-1), 0)
     certain = (known <= ROUNDING * brightest[..., None]).all(-1)
-    open_ = np.zeros(certain.shape, bool) if alpha is None else alpha == 0
-    black = certain & (brightest == 0) & open_
+    uncovered = np.zeros(certain.shape, bool) if alpha is None else alpha == 0
+    black = certain & (brightest == 0) & uncovered
     exact = certain & (brightest > 0) | black
     # A medium shows light where alpha is 0.
-    empty = black & ~(window_means(open_ & (mean != 0).any(-1), REACH) > 0)
+    empty = black & ~(window_means(uncovered & (mean != 0).any(-1), REACH) > 0)
     most, found = limit(samples), []
     for c in range(3):
         error, value = known[..., c], mean[..., c]

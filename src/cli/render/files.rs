@@ -106,14 +106,12 @@ pub fn check_inputs(args: &RenderArgs, outputs: &Outputs, scene: &Scene) -> Resu
     let resumed = args.run.resume.as_ref().filter(|path| !saves(path));
     let files = scene.files.iter().chain(resumed).map(PathBuf::as_path);
     outputs.check(files.chain(output::model_file(&args.options.finish)))?;
-    // The names of the pictures in this folder depend on the techniques. Some may be links to an input.
+    // The names of the pictures depend on the techniques, so no picture in the folder may be an input or a link to one.
     let Some(folder) = &args.debug_techniques else { return Ok(()) };
     let is_picture = |path: &Path| path.extension().is_some_and(|kind| kind == "exr" || kind == "png");
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
     let pictures: Vec<PathBuf> = entries.filter(|path| is_picture(path)).collect();
-    let is_there = |path: &Path| is_picture(path) && files::is_same_folder(files::folder(path), folder);
-    let is_linked = |path: &Path| pictures.iter().any(|picture| files::is_same(picture, path));
-    match scene.files.iter().find(|path| is_there(path) || is_linked(path)) {
+    match scene.files.iter().find(|path| pictures.iter().any(|picture| files::is_same(picture, path))) {
         None => Ok(()),
         Some(input) => {
             let cause = format!("{} is an input in this folder, which might be overwritten", input.display());
