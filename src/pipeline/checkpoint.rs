@@ -10,7 +10,6 @@ use crate::files;
 use crate::git_lfs;
 use crate::image::atomic;
 use crate::render::{Candidate, State};
-use crate::scene::gltf;
 use crate::system;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -156,27 +155,4 @@ pub(super) fn first_difference(there: &Value, here: &Value, free: &[&str]) -> Op
         let [there, here] = [there, here].map(|arguments| arguments.get(key).cloned().unwrap_or_default());
         (there != here).then(|| (key.clone(), there, here))
     })
-}
-
-/// A hash of a scene: of its files, or of the .glb that they were `converted` to, and of the environment that the options
-/// name. `None` if the scene came through a pipe and cannot be read again.
-///
-/// # Errors
-/// The scene cannot be read.
-pub fn hash(
-    scene: &Path,
-    converted: Option<&str>,
-    environment: Option<&Path>,
-    allow_outside: bool,
-) -> Result<Option<String>> {
-    if !scene.is_file() {
-        return Ok(None);
-    }
-    let scene = converted.map_or_else(|| gltf::hash(scene, allow_outside), |hash| Ok(hash.to_owned()))?;
-    let mut hasher = blake3::Hasher::new();
-    hasher.update(scene.as_bytes());
-    if let Some(bytes) = environment.filter(|path| path.is_file()).and_then(|path| std::fs::read(path).ok()) {
-        hasher.update(&bytes);
-    }
-    Ok(Some(hasher.finalize().to_hex().to_string()))
 }

@@ -54,6 +54,8 @@ pub(super) struct Contents<'a> {
     pub facts: &'a SceneFacts,
     pub selection: &'a Selection,
     pub naming: Naming,
+    /// [`Head::scene`](super::checkpoint::Head::scene) and [`Head::plan`](super::checkpoint::Head::plan).
+    pub scene: &'a str,
     pub plan: &'a Value,
     pub arguments: &'a Value,
     /// Whether the header leaves out clocks and the number of threads.
@@ -79,6 +81,7 @@ pub(super) fn deliver_render(
         facts: &facts,
         selection: &request.layers,
         naming: request.naming,
+        scene: &head.scene,
         plan: &head.plan,
         arguments: &request.arguments,
         reproducible: request.reproducible,
@@ -142,6 +145,7 @@ impl Contents<'_> {
         let rejections = rendered.rejections();
         let rejected = rejections.sentence().filter(|_| rejections.are_too_many());
         let warnings: Vec<&String> = self.facts.warnings.iter().chain(&rejected).collect();
+        header.extend((!self.scene.is_empty()).then(|| ("scene_hash".to_owned(), self.scene.into())));
         header.insert("plan".into(), self.plan.clone());
         header.insert("arguments".into(), self.arguments.clone());
         header.insert("warnings".into(), json!(warnings));

@@ -35,7 +35,8 @@ impl EditableScene {
     /// Errors of [`load::load`].
     pub fn load(request: SceneRequest, threads: usize, stop: &Stop) -> Result<EditableScene> {
         let (description, file) = load::read(&request, threads, stop)?;
-        let loaded = Loaded { file, ..load::build(description.clone(), &request, threads)? };
+        let hash = load::hash(&request, &description)?;
+        let loaded = Loaded { file, hash, ..load::build(description.clone(), &request, threads)? };
         Ok(EditableScene { request, description, loaded, is_edited: false })
     }
 

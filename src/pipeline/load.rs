@@ -58,6 +58,9 @@ pub struct Loaded {
     pub removed: Removed,
     /// The glTF file of the scene, if it is read again for other moments; otherwise `None`.
     pub file: Option<gltf::MovingFile>,
+    /// Hash of the scene's files, hexadecimal. `None` if the scene did not come from files that can be read again, or
+    /// has been edited.
+    pub hash: Option<String>,
 }
 
 /// Reads and builds a scene. Embree builds with `threads` threads.
@@ -67,7 +70,32 @@ pub struct Loaded {
 /// `stop` is set.
 pub fn load(request: &SceneRequest, threads: usize, stop: &Stop) -> Result<Loaded> {
     let (description, file) = read(request, threads, stop)?;
-    Ok(Loaded { file, ..build(description, request, threads)? })
+    let hash = hash(request, &description)?;
+    Ok(Loaded { file, hash, ..build(description, request, threads)? })
+}
+
+/// Hash of the files of a scene, or of the .glb that a converter has turned them into, and of the environment that the
+/// request names.
+///
+/// # Errors
+/// The scene cannot be read.
+pub(super) fn hash(request: &SceneRequest, description: &Description) -> Result<Option<String>> {
+    if !request.path.is_file() {
+        return Ok(None);
+    }
+    let scene = match &description.converted {
+        Some(hash) => hash.clone(),
+        None => gltf::hash(&request.path, request.options.allow_outside)?,
+    };
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(scene.as_bytes());
+    if let Some(Environment::File(path)) = &request.environment
+        && path.is_file()
+        && let Ok(bytes) = std::fs::read(path)
+    {
+        hasher.update(&bytes);
+    }
+    Ok(Some(hasher.finalize().to_hex().to_string()))
 }
 
 /// Reads the description of a scene, and the file of its moments.
@@ -132,7 +160,7 @@ pub(super) fn build(mut description: Description, request: &SceneRequest, thread
         description.picture.film_transparent = hidden;
     }
     let removed = switch::remove_effects(&mut description, request.off);
-    Ok(Loaded { scene: Scene::build(description, threads)?, removed, file: None })
+    Ok(Loaded { scene: Scene::build(description, threads)?, removed, file: None, hash: None })
 }
 
 /// Replaces the environment of a scene description and changes it, as the request says.

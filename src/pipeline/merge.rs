@@ -133,8 +133,7 @@ impl Shards {
         let Shards { mut files, missing } = self;
         let parts: Vec<ShardResult> = files.iter().map(|(_, file)| file.part.clone()).collect();
         let part = ShardResult::merge(&parts).ok_or_else(none)?;
-        let (facts, plan) =
-            files.first().map(|(_, file)| (file.facts.clone(), file.head.plan.clone())).ok_or_else(none)?;
+        let (facts, head) = files.first().map(|(_, file)| (file.facts.clone(), file.head.clone())).ok_or_else(none)?;
         layers::check(&request.layers, &facts.shape, request.finish.is_some(), facts.motion.is_some())?;
         let levels = Some(part.settings.levels.count);
         let mut finish = request.finish.as_ref().map(|wanted| finish::open(wanted, levels)).transpose()?;
@@ -156,7 +155,8 @@ impl Shards {
             facts: &facts,
             selection,
             naming: *naming,
-            plan: &plan,
+            scene: &head.scene,
+            plan: &head.plan,
             arguments: &arguments,
             reproducible: *reproducible,
             more,

@@ -90,7 +90,7 @@ pub fn render_loaded(mut request: Request, loaded: &Loaded, observer: &mut dyn O
     // Lights may be dark at the frame, and the camera elsewhere.
     let middle = motion.as_ref().map(|motion| motion.at(0.5)).transpose()?;
     let seen = middle.as_ref().map_or(view, |(scene, camera)| View::new(scene, camera));
-    let resumption = Resumption::read(&request, view.scene, &settings)?;
+    let resumption = Resumption::read(&request, loaded.hash.clone(), &settings)?;
     let learnt = Learnt::new(seen, &settings, &observer.stop());
     let with_learnt = |scene: &Scene| scene.with_learnt(&learnt.light);
     let scene = with_learnt(view.scene);

@@ -11,7 +11,6 @@ use crate::film::{CRYPTOMATTES, Layer, LayerSet, kind_of};
 use crate::image::exr::{self, Attributes};
 use crate::math::Vec3;
 use serde_json::{Map, Value, json};
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Options that may differ between renders whose mean is made.
@@ -125,6 +124,11 @@ impl Seeds {
         };
         if let Some(first) = self.sources.first() {
             let name = first.path.display();
+            let hash = |header: &Value| header["scene_hash"].as_str().map(str::to_owned);
+            if hash(&header).zip(hash(&first.header)).is_some_and(|(own, other)| own != other) {
+                let cause = format!("was rendered from other scene files than {name}");
+                return Err(error(cause).hint("merge renders of one scene"));
+            }
             if let Some((key, there, here)) =
                 first_difference(&first.header["arguments"], &header["arguments"], &FREE_OPTIONS)
             {
@@ -132,15 +136,10 @@ impl Seeds {
                 return Err(error(cause).hint("merge renders that differ in their --seed alone"));
             }
         }
-        if let Some((sum, others)) = &self.sum {
+        if let Some((sum, _)) = &self.sum {
             if (sum.width, sum.height) != (set.width, set.height) {
                 let cause = format!("is {} x {}, the others {} x {}", set.width, set.height, sum.width, sum.height);
                 return Err(error(cause).hint("merge renders of one picture"));
-            }
-            let (theirs, own) = (manifests(others), manifests(attributes));
-            if !own.is_subset(&theirs) && !theirs.is_subset(&own) {
-                let cause = "shows objects or materials of other names than the others".to_owned();
-                return Err(error(cause).hint("merge renders of one scene"));
             }
         }
         let seeds = match header["merged"]["seeds"].as_array() {
@@ -224,11 +223,6 @@ impl Seeds {
         attributes.insert(exr::ATTRIBUTE, &header(&sources, total))?;
         Ok((set, attributes))
     }
-}
-
-/// The names of objects and of materials in the attributes of a render's cryptomattes.
-fn manifests(attributes: &Attributes) -> BTreeSet<&String> {
-    attributes.texts.iter().filter(|(name, _)| name.ends_with("/manifest")).map(|(_, manifest)| manifest).collect()
 }
 
 /// Whether any of the renders states the error of its finished picture.

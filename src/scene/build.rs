@@ -95,7 +95,6 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     Ok(Scene {
         source: description.source,
         files: description.files,
-        converted: description.converted,
         origin,
         shapes,
         materials,

@@ -50,9 +50,6 @@ pub struct Scene {
     pub source: PathBuf,
     /// Paths of all files that the scene names or is read from, the scene file included.
     pub files: Vec<PathBuf>,
-    /// Hash of the .glb into which a converter has turned the scene file, see [`Description::converted`]; `None`
-    /// without a converter.
-    pub converted: Option<String>,
     /// Offset (m) that was subtracted from all world positions; zero except for scenes far from the origin.
     pub origin: DVec3,
     /// Meshes and their instances.

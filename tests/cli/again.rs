@@ -115,7 +115,7 @@ fn renders_of_two_scenes_are_not_merged() {
     }
     let refused = folder.run("merge scene.exr torus.exr -o merged.exr");
     let error =
-        "torus.exr: shows objects or materials of other names than the others\nhint: merge renders of one scene\n";
+        "torus.exr: was rendered from other scene files than scene.exr\nhint: merge renders of one scene\n";
     assert_eq!((refused.code, refused.stderr.as_str()), (Some(2), error));
 }
 
