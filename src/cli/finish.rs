@@ -54,6 +54,10 @@ pub fn run(args: &FinishArgs) -> Result<()> {
         let error = Error::usage("--frames and --skip-existing concern the frames of an animation");
         return Err(error.hint("leave them out, or put '####' where the frame's number belongs, such as shot.####.exr"));
     }
+    if path_of_frame(&args.output, 0).is_some() {
+        let error = Error::usage("--output has a place for a frame's number, and the input is one file");
+        return Err(error.hint("name one file, or put '####' in the name of the input too"));
+    }
     output::check(&args.output, "exr")?;
     args.picture.check()?;
     let outputs = Outputs::new(std::iter::once(&args.output).chain(&args.picture.png).cloned())?;

@@ -35,6 +35,19 @@ impl Outputs {
         Ok(outputs)
     }
 
+    /// Checks that all outputs are regular files, or missing.
+    ///
+    /// # Errors
+    /// One is a pipe or a device.
+    pub fn check_regular(&self) -> Result<()> {
+        match self.paths.iter().find(|path| path.exists() && !path.is_file()) {
+            None => Ok(()),
+            Some(path) => {
+                Err(Error::new(ErrorKind::Usage, path.display(), "is not a regular file").hint("name another output"))
+            }
+        }
+    }
+
     /// Checks that no output replaces a file that the run reads, under whatever name.
     ///
     /// # Errors

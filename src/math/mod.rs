@@ -10,7 +10,9 @@ pub mod warp;
 pub use angle::{atan2_turns, sin_cos_octant, sin_cos_turns};
 pub use bounds::{bounding_box, bounding_box_f64, corners};
 pub use frame::{Frame, orthonormal_basis};
-pub use glam::{Affine3A, DAffine3, DMat3, DMat4, DVec2, DVec3, DVec4, Mat3, Mat3A, UVec2, Vec2, Vec3, Vec3A, Vec4};
+pub use glam::{
+    Affine3A, DAffine3, DMat3, DMat4, DVec2, DVec3, DVec4, Mat2, Mat3, Mat3A, UVec2, Vec2, Vec3, Vec3A, Vec4,
+};
 pub use rgb::{Rgb, is_lit, luminance};
 pub use spherical_triangle::SphericalTriangle;
 

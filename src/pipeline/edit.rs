@@ -2,6 +2,7 @@
 
 use super::load::{self, Loaded, SceneRequest};
 use crate::error::{Error, ErrorKind, Result};
+use crate::files;
 use crate::math::DAffine3;
 use crate::scene::Description;
 use crate::stop::Stop;
@@ -74,6 +75,8 @@ impl EditableScene {
                 Edit::Place(name, to_world) => description.place(name, *to_world)?,
                 Edit::Remove(name) => description.remove(name)?,
                 Edit::Replace(path) => {
+                    // Who waits for the answer must not wait for a pipe.
+                    files::open(path).map_err(|cause| Error::io(path, &cause).hint("name a scene file"))?;
                     let (mut part, _) = load::read_file(path, &self.request.options, stop)?;
                     warnings.append(&mut part.warnings);
                     description.replace_by(part);

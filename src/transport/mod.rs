@@ -32,5 +32,5 @@ pub use walk::segment::{
     Arrival, End, FirstHit, HOLE, MediumArrival, PrecomputedHit, ShadowRay, Start, Visibility, next_surface, shadow_ray,
 };
 pub use walk::vertex::{MediumLight, MediumVertex, Next, Scattered, Vertex, Visitor};
-pub use walk::visible::visible_surface;
+pub use walk::visible::{PointOnRay, Through, Visible, last_ray, visible_surface};
 pub use walk::{CUT_INTERVAL, PathStart, walk};

@@ -114,8 +114,7 @@ fn renders_of_two_scenes_are_not_merged() {
         done(&folder.run(&format!("{render} --method path --iterations 2 --seed {seed} -o {scene}.exr")));
     }
     let refused = folder.run("merge scene.exr torus.exr -o merged.exr");
-    let error =
-        "torus.exr: was rendered from other scene files than scene.exr\nhint: merge renders of one scene\n";
+    let error = "torus.exr: was rendered from other scene files than scene.exr\nhint: merge renders of one scene\n";
     assert_eq!((refused.code, refused.stderr.as_str()), (Some(2), error));
 }
 

@@ -215,9 +215,13 @@ fn rendered_files_are_those_of_the_command_line() {
     assert_eq!((&done["event"], &done["interrupted"]), (&"done".into(), &false.into()), "{done}");
     let [expected, found] = ["out.exr", "served.exr"].map(|name| std::fs::read(folder.path(name)).expect("a file"));
     assert!(expected == found, "the files differ");
+    assert!(std::process::Command::new("mkfifo").arg(folder.path("pipe")).status().expect("mkfifo runs").success());
     for (words, said) in [
         (json!([]), "needs the name of its file"),
         (json!(["-o", "-"]), "needs the name of its file"),
+        (json!(["-o", "/dev/stdout"]), "is not a regular file"),
+        (json!(["-o", "pipe"]), "is not a regular file"),
+        (json!(["-o", "x.exr", "--png", "pipe"]), "is not a regular file"),
         (json!(["-o", "x.exr", "--env", "1,1,1"]), "an option about reading the scene differs"),
         (json!(["-o", "x.exr", "--threads", "1"]), "has its threads already"),
         (json!(["-o", "x.exr", "--help"]), "ask for help"),
@@ -328,6 +332,13 @@ fn a_command_or_the_end_of_the_input_ends_a_long_picture() {
     let done = server.answer().about;
     assert_eq!((&done["event"], &done["interrupted"]), (&"done".into(), &true.into()), "{done}");
     assert!(folder.read("x.exr").1["iterations"].as_u64().is_some_and(|n| n > 0));
+    // Stopped before its first iteration, it does not claim the picture that is there.
+    let words = ["-o", "x.exr", "--overwrite", "--method", "vcm", "--no-finish", "--width", "2500", "--height", "2500"];
+    server.send(&json!({"command": "render", "id": 8, "arguments": words}));
+    std::thread::sleep(Duration::from_millis(300));
+    server.send(&json!({"command": "stop"}));
+    let stopped = server.answer().about;
+    assert_eq!((&stopped["event"], &stopped["iterations"]), (&"stopped".into(), &0.into()), "{stopped}");
     server.send(&long(9));
     std::thread::sleep(Duration::from_millis(100));
     server.end();
@@ -346,6 +357,8 @@ fn malformed_commands_end_nothing() {
         assert_eq!(answer["message"], format!("{name}: it is not a regular file"), "{answer}");
     }
     server.load("a.glb", &[]);
+    let answer = server.ask(&json!({"command": "edit", "id": 1, "files": ["pipe.glb"]}));
+    assert_eq!(answer["message"], "pipe.glb: it is not a regular file", "{answer}");
     let commands: Vec<Vec<u8>> = [
         json!({"command": "load", "scene": "missing.glb", "arguments": ["--method", "path"]}),
         json!({"command": "edit", "remove": ["x"], "place": [{"name": "Box", "matrix": at(0.0, 0.0, 0.0)}], "files": ["x"]}),

@@ -61,19 +61,21 @@ fn render_one(args: &RenderArgs, outputs: &Outputs, turn: Option<FrameOfRun>) ->
     let request = check(args)?;
     let mut reports = Reports::new(args, outputs, turn);
     let delivery = pipeline::render(request, &mut reports).map_err(|error| reports.explain(error))?;
-    reports.deliver(delivery)
+    reports.deliver(delivery)?.map_or(Ok(()), |summary| summary.check_interrupted(args))
 }
 
-/// Renders one picture of a scene that has been loaded, as another program asks.
+/// Renders one picture of a scene that has been loaded, as another program asks. Returns whether it has fewer iterations
+/// than it was to have, because `control` has stopped them.
 ///
 /// # Errors
-/// Errors of [`run`].
-pub fn render_loaded(args: &RenderArgs, loaded: &Loaded, control: Control) -> Result<()> {
+/// Errors of [`run`]; an output is a pipe or a device, for which the other program would have to wait.
+pub fn render_loaded(args: &RenderArgs, loaded: &Loaded, control: Control) -> Result<bool> {
     let outputs = files::outputs(args)?;
+    outputs.check_regular()?;
     let request = check(args)?;
     let mut reports = Reports { control: Some(control), ..Reports::new(args, &outputs, None) };
     let delivery = pipeline::render_loaded(request, loaded, &mut reports)?;
-    reports.deliver(delivery)
+    Ok(reports.deliver(delivery)?.is_some_and(|summary| summary.is_interrupted()))
 }
 
 /// Checks the options of a render and its files. Returns the request for the pipeline.
@@ -237,7 +239,7 @@ impl<'a> Reports<'a> {
             json!({
                 "scene": events::path(&self.args.options.scene.path), "output": events::path(&self.args.output),
                 "frame": self.frame(),
-                "method": settings.method, "iterations": settings.iterations, "seconds": settings.time,
+                "method": settings.method, "iterations": settings.iterations, "seconds": self.args.options.settings.time,
                 "target_error": settings.target_error,
             }),
         );
@@ -255,11 +257,11 @@ impl<'a> Reports<'a> {
     }
 
     /// Writes all files of a render, and reports how it ended.
-    fn deliver(self, delivery: Delivery) -> Result<()> {
+    fn deliver(self, delivery: Delivery) -> Result<Option<Summary>> {
         let frame = self.frame();
         let Reports { args, summary, preview, made_for, reason_if_black, estimate, .. } = self;
         let Delivery { set, attributes, techniques, sums, .. } = &delivery;
-        let Some(summary) = summary else { return Ok(()) };
+        let Some(summary) = summary else { return Ok(None) };
         let talk = args.progress.for_people();
         // The EXR comes last: where it exists, the frame is done.
         let others = args.picture.write_png(set, &made_for).and(techniques::write(args, techniques, &made_for));
@@ -286,7 +288,7 @@ impl<'a> Reports<'a> {
                 "the unfinished render is in {output}: 'caustique finish {output} -o OUT.exr' finishes it"
             )));
         }
-        summary.check_interrupted(args)
+        Ok(Some(summary))
     }
 }
 

@@ -113,7 +113,7 @@ impl Summary {
             json!({
                 "frame": frame, "iterations": self.iterations, "seconds": self.seconds, "light_paths": self.light_paths,
                 "error": finished.or(self.error), "error_of": error_of,
-                "interrupted": self.stop == StopReason::Interrupted,
+                "interrupted": self.is_interrupted(),
             }),
         );
     }
@@ -138,9 +138,14 @@ impl Summary {
         }
     }
 
+    /// Whether a signal or another program has stopped the render.
+    pub fn is_interrupted(&self) -> bool {
+        self.stop == StopReason::Interrupted
+    }
+
     /// Fails if a signal has stopped the render.
     pub fn check_interrupted(&self, args: &RenderArgs) -> Result<()> {
-        if self.stop != StopReason::Interrupted {
+        if !self.is_interrupted() {
             return Ok(());
         }
         let cause = format!("interrupted after {} iterations, which are written", self.iterations);

@@ -201,13 +201,10 @@ impl Server {
         let done = render::render_loaded(&args, kept.scene.loaded(), stop);
         let interrupted = match done {
             Err(error) if error.kind == ErrorKind::Interrupted => {
-                if !args.output.is_file() {
-                    outbox::stopped(id, 0);
-                    return Ok(());
-                }
-                true
+                outbox::stopped(id, 0);
+                return Ok(());
             }
-            done => done.map(|()| false)?,
+            done => done?,
         };
         let answer = json!({
             "output": super::events::path(&args.output), "interrupted": interrupted, "seconds": clock.seconds(),

@@ -101,8 +101,13 @@ impl CameraPaths<'_> {
     /// selects.
     #[inline]
     pub fn start_at(&self, pixel: (u32, u32), within: Vec2, stream: Stream) -> PathStart {
+        self.start_from(self.camera.film_point(pixel, within), stream)
+    }
+
+    /// The first ray of a camera path through a point of the whole picture (pixels).
+    #[inline]
+    pub fn start_from(&self, film: Vec2, stream: Stream) -> PathStart {
         let draws = stream.vertex(0);
-        let film = self.camera.film_point(pixel, within);
         let ray = self.camera.ray(film, draws.two(Purpose::Lens));
         let interior = self.interior.at(self.scene, ray.origin).decided(self.scene, draws);
         let seen = if self.scene.survey.hidden_solids { interior.seen_radiance(self.scene) } else { 1.0 };
