@@ -33,13 +33,12 @@ def start(width=1280, height=720):
 # Materials
 
 
-def principled(name, color=(0.8, 0.8, 0.8), roughness=0.5, texture=None, normal=None, one_sided=False, **inputs):
+def principled(name, color=(0.8, 0.8, 0.8), roughness=0.5, texture=None, normal=None, **inputs):
     """A Principled material. `texture` and `normal` are images; `inputs` are values by socket name, with _ for
     spaces."""
     material = bpy.data.materials.new(name)
     if bpy.app.version < (5, 0, 0):
         material.use_nodes = True
-    material.use_backface_culling = one_sided
     tree = material.node_tree
     shader = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
     shader.inputs["Base Color"].default_value = (*color, 1)
@@ -83,8 +82,10 @@ def glass(name, ior=1.5, roughness=0.0, absorption=None, abbe=None):
 def emission(name, radiance):
     """A black surface that emits this radiance (W/sr/m2) from the front of its faces."""
     strength = max(radiance)
-    return principled(name, (0, 0, 0), 1.0, one_sided=True, Specular_IOR_Level=0.0,
-                      Emission_Color=(*(c / strength for c in radiance), 1), Emission_Strength=strength)
+    material = principled(name, (0, 0, 0), 1.0, Specular_IOR_Level=0.0,
+                          Emission_Color=(*(c / strength for c in radiance), 1), Emission_Strength=strength)
+    material[export.shading.ONE_SIDED] = True
+    return material
 
 
 def image(name, pixels, data=False, quality=85):

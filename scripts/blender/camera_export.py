@@ -54,11 +54,27 @@ def _panorama(camera, render):
         return {"fisheye": "equidistant", "fov_deg": math.degrees(fov), "half_size": [fov / 2, fov / 2]}
     if settings.panorama_type != "FISHEYE_EQUISOLID":
         return None
+    width, height, side = _fit(camera, render)
+    length = camera.sensor_height if camera.sensor_fit == "VERTICAL" else camera.sensor_width
+    half = length / 2 / settings.fisheye_lens / side
+    return {"fisheye": "equisolid", "fov_deg": math.degrees(fov), "half_size": [half * width, half * height]}
+
+
+def _fit(camera, render):
+    """Width and height of the picture, and that of them to which a camera's sensor or orthographic scale is fitted."""
     width, height = render.resolution_x * render.pixel_aspect_x, render.resolution_y * render.pixel_aspect_y
     across = camera.sensor_fit == "HORIZONTAL" or camera.sensor_fit == "AUTO" and width >= height
-    length = camera.sensor_height if camera.sensor_fit == "VERTICAL" else camera.sensor_width
-    half = length / 2 / settings.fisheye_lens / (width if across else height)
-    return {"fisheye": "equisolid", "fov_deg": math.degrees(fov), "half_size": [half * width, half * height]}
+    return width, height, width if across else height
+
+
+def correct_sizes(document, render):
+    """Correct the sizes of orthographic cameras, whose sensor fit Blender's exporter ignores."""
+    for entry in document.get("cameras", []):
+        camera = bpy.data.cameras.get(entry.get("name", ""))
+        if camera is not None and "orthographic" in entry:
+            width, height, side = _fit(camera, render)
+            half = camera.ortho_scale / 2 / side
+            entry["orthographic"].update(xmag=half * width, ymag=half * height)
 
 
 def extras(thing, flat, warn):
@@ -80,10 +96,8 @@ def optics(thing, render):
     camera = thing.data
     said = {"view": camera.ortho_scale if camera.type == "ORTHO" else camera.sensor_width / camera.lens}
     if camera.shift_x or camera.shift_y:
-        width, height = render.resolution_x * render.pixel_aspect_x, render.resolution_y * render.pixel_aspect_y
-        across = camera.sensor_fit == "HORIZONTAL" or camera.sensor_fit == "AUTO" and width >= height
-        length = width if across else height
-        said["shift"] = [camera.shift_x * length / width, camera.shift_y * length / height]
+        width, height, side = _fit(camera, render)
+        said["shift"] = [camera.shift_x * side / width, camera.shift_y * side / height]
     if not camera.dof.use_dof:
         return said
     # Cycles: half of focal length over f-number; an orthographic camera has a focal length of one unit.
@@ -184,12 +198,17 @@ def _warn_of_limits(scene, where, warn):
     cycles = getattr(scene, "cycles", None)
     if cycles is None:
         return
-    usual = {"max_bounces": 12, "diffuse_bounces": 4, "glossy_bounces": 4, "transmission_bounces": 12}
+    usual = {"max_bounces": 12, "diffuse_bounces": 4, "glossy_bounces": 4, "transmission_bounces": 12,
+             "transparent_max_bounces": 8}
     tight = [f"{name.replace('_', ' ')} {getattr(cycles, name)}" for name, number in usual.items()
              if getattr(cycles, name) < number]
     if tight:
         warn(where, f"Cycles' limits on light paths are not carried ({', '.join(tight)}): there is more light here; "
                     "--max-depth cuts paths, too")
+    off = [name for name in ("reflective", "refractive") if not getattr(cycles, f"caustics_{name}")]
+    if off:
+        warn(where, f"Cycles' switches of caustics are not carried ({' and '.join(off)} ones are off): there are "
+                    "caustics here; switch them on (Light Paths > Caustics) to see the same in Cycles")
     clamp = [f"{name} {getattr(cycles, 'sample_clamp_' + name):g}" for name, usual in (("direct", 0), ("indirect", 10))
              if 0 < getattr(cycles, "sample_clamp_" + name) != usual]
     if clamp:

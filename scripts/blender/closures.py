@@ -7,7 +7,8 @@ import bpy
 
 import attributes
 import camera_coordinates
-from graph import is_constant, source_socket, upstream
+from graph import is_constant
+from shading import source_socket, upstream
 
 _DEPENDS_ON_VIEW = {
     "FRESNEL": {"Fac"}, "LAYER_WEIGHT": {"Fresnel", "Facing"}, "NEW_GEOMETRY": {"Incoming", "Backfacing"},

@@ -3,7 +3,7 @@ scaled."""
 
 import numpy
 
-from graph import source_socket
+from shading import source_socket
 
 _WRAPS = {"REPEAT", "EXTEND", "MIRROR"}
 _SMALL_IMAGE = 256  # texels

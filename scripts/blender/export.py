@@ -102,7 +102,7 @@ def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None, onl
         lighting.add_lamps(flat, warn)
         if sun is not None:
             environment = said["environment"]
-            hidden = ["camera"] if {"visible", "background"} & set(environment) else []
+            hidden = ["camera"] if "background" in environment else []
             sky.add_sun(sun, flat, hidden, environment.get("light_group"))
         bodies = _solidity(flat.things)
         _warn_of_leaning_normals(flat, polished, warn)
@@ -117,7 +117,8 @@ def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None, onl
     _restore_names(document, flat.names)
     buffer = worn.finish(document, buffer, bodies)
     _warn_of_stretched_normals(document, warn)
-    _correct_lamps(document, flat.lamp_factors, warn)
+    _correct_lamps(document, flat.lamps)
+    camera_export.correct_sizes(document, scene.render)
     buffer = lamp_profiles.embed(document, buffer, flat.profiles)
     buffer = lamp_pictures.embed(document, buffer, flat.pictures)
     volumes.embed(document, flat.volumes, path, warn)
@@ -207,8 +208,8 @@ def _export_all_it_can(path, flat, warn):
         return
     _, bad = guard.exportable(flat.things, works)
     for thing in bad:
-        warn(flat.where(thing), f"Blender's exporter fails on it ({faults[0]}): it is left out; "
-                                "apply its modifiers (Object > Apply > Visual Geometry to Mesh)")
+        where = flat.where(thing)
+        warn(where, f"Blender's exporter fails on it ({faults[0]}): it is left out; {guard.remedy(where)}")
         flat.remove(thing)
     if not works(flat.things):
         raise RuntimeError(f"Blender's glTF exporter fails: {faults[-1]}")
@@ -266,11 +267,12 @@ def _polished(things):
 
 def _is_polished(material):
     """Whether the highlights of a material are sharp enough to show where its normals point."""
-    output = shading.output_of(shading.nodes_of(material))
-    parts = shading.leaves(shading.source(output.inputs["Surface"])) if output is not None else []
-    roughness = [shading.constant(part.inputs["Roughness"], 0.0) for part in parts
-                 if part.type not in {"BSDF_DIFFUSE", "DIFFUSE_BSDF"} and "Roughness" in part.inputs]
-    return any(value < _POLISHED for value in roughness)
+    with guard.naming(f'material "{material.name}"'):
+        output = shading.output_of(shading.nodes_of(material))
+        parts = shading.leaves(output.inputs["Surface"]) if output is not None else []
+        roughness = [shading.constant(part.inputs["Roughness"], path, 0.0) for part, path in parts
+                     if part.type not in {"BSDF_DIFFUSE", "DIFFUSE_BSDF"} and "Roughness" in part.inputs]
+        return any(value < _POLISHED for value in roughness)
 
 
 def _warn_of_immersed_camera(flat, bodies, warn):
@@ -312,14 +314,15 @@ def _leaning_share(mesh, degrees):
 
 def may_transmit(material):
     """Whether light may enter an object with this material."""
-    output = shading.output_of(shading.nodes_of(material))
-    if output is None:
-        return False
-    if output.inputs["Volume"].is_linked:
-        return True
-    parts = shading.leaves(shading.source(output.inputs["Surface"]))
-    return any(shading.constant(p.inputs[name], 1.0) for p in parts if p.type == "BSDF_PRINCIPLED"
-               for name in ("Transmission Weight", "Subsurface Weight"))
+    with guard.naming(f'material "{material.name}"'):
+        output = shading.output_of(shading.nodes_of(material))
+        if output is None:
+            return False
+        if shading.source(output.inputs["Volume"])[0] is not None:
+            return True
+        parts = shading.leaves(output.inputs["Surface"])
+        return any(shading.constant(p.inputs[name], path, 1.0) for p, path in parts if p.type == "BSDF_PRINCIPLED"
+                   for name in ("Transmission Weight", "Subsurface Weight"))
 
 
 def _closed(mesh):
@@ -356,13 +359,10 @@ def _restore_names(document, names):
             entry["name"] = names.get(entry.get("name", ""), entry.get("name", ""))
 
 
-def _correct_lamps(document, factors, warn):
-    """Correct lamps with an Emission node: the exporter uses it instead of power and colour, Cycles multiplies both."""
+def _correct_lamps(document, lamps):
+    """Give the lights of a document the names, colours and intensities of `FlatScene.lamps`."""
     for entry in document.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", []):
-        light = bpy.data.lights.get(entry.get("name", ""))
-        if light is not None:
-            entry.update(guard.attempt(warn, f'light "{light.name}"', {}, "it shines as Blender's exporter wrote it",
-                                       lighting.punctual, light, factors))
+        entry.update(lamps.get(entry.get("name"), {}))
 
 
 def _warn_of_stretched_normals(document, warn):
@@ -422,7 +422,8 @@ def main(arguments):
         else:
             write(given.files[-1], bake_size=size)
     except Exception as error:  # any error of Blender: a message and an exit code, never a hanging process
-        print(f"error: {given.files[0]}: {error}".strip(), file=sys.stderr)
+        place = f"{error.place}: " if hasattr(error, "place") else ""
+        print(f"error: {given.files[0]}: {place}{error}".strip(), file=sys.stderr)
         return 1
     return 0
 

@@ -153,8 +153,10 @@ def main(arguments):
     except MemoryError:
         end(Fault("the scene takes more memory than there is", "simplify it, or use smaller textures"))
     except Exception as error:  # any error of Blender: a message and an exit code, never a hanging process
+        import export_guard
+        place = getattr(error, "place", "")
         end(Fault(f"the scene cannot be exported: {type(error).__name__}: {last_line(error)}",
-                  "try File > Export > glTF 2.0 in Blender, which shows what it stumbles over"))
+                  export_guard.remedy(place), place))
     end()
 
 

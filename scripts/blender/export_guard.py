@@ -1,7 +1,28 @@
 """Keeps an export going: whatever fails is named in a warning, and replaced or left out."""
 
+import contextlib
 import sys
 import traceback
+
+# What may help where the export of a thing fails, by the first word of its name in warnings.
+_REMEDIES = {"object": "apply its modifiers (Object > Apply > Visual Geometry to Mesh) and make it local",
+             **dict.fromkeys(("material", "light", "world"), "simplify its nodes")}
+
+
+@contextlib.contextmanager
+def naming(where):
+    """Adds to an error of the body, as `place`, the name of the thing that it concerns, unless it has one."""
+    try:
+        yield
+    except Exception as error:
+        error.place = getattr(error, "place", where)
+        raise
+
+
+def remedy(where):
+    """What the user may do where the export of a thing fails."""
+    known = _REMEDIES.get(where.split(" ")[0])
+    return f"{known}, or report the error with the file" if known else "report the error with the file"
 
 
 def attempt(warn, where, otherwise, instead, work, *arguments):
@@ -13,8 +34,8 @@ def attempt(warn, where, otherwise, instead, work, *arguments):
         return work(*arguments)
     except Exception as error:  # files from anywhere, many versions of Blender: no list of kinds could be complete
         traceback.print_exc(file=sys.stderr)
-        warn(where, f"it cannot be exported as it is ({summary(error)}): {instead}; "
-                    "apply its modifiers and make it local, or report the error with the file")
+        where = getattr(error, "place", where)
+        warn(where, f"it cannot be exported as it is ({summary(error)}): {instead}; {remedy(where)}")
         return otherwise
 
 

@@ -1,12 +1,12 @@
 """Arithmetic on node trees, in a temporary copy of a material where any socket is available at the top level.
 
-A *value* is a float, a colour of three floats, or an output socket at the top level of the copy. A *path* lists the
-group nodes around a socket, outermost first. Arithmetic on values adds nodes only if an operand is not constant.
+A *value* is a float, a colour of three floats, or an output socket at the top level of the copy. Arithmetic on values
+adds nodes only if an operand is not constant.
 """
 
 import bpy
 
-from shading import output_of
+from shading import constant, find_socket, group_output, luminance, output_of, source_socket, upstream
 
 _SOCKETS = {"VALUE": "NodeSocketFloat", "INT": "NodeSocketFloat", "BOOLEAN": "NodeSocketFloat",
             "RGBA": "NodeSocketColor", "VECTOR": "NodeSocketVector"}
@@ -16,59 +16,6 @@ FUNCTIONS = {
     "VALTORGB", "CURVE_RGB", "CURVE_FLOAT", "CURVE_VEC", "BLACKBODY", "WAVELENGTH", "SEPARATE_COLOR", "COMBINE_COLOR",
     "SEPRGB", "COMBRGB", "SEPHSV", "COMBHSV", "SEPXYZ", "COMBXYZ", "RGBTOBW", "VECTOR_ROTATE", "VALUE", "RGB",
 }
-
-
-def find_socket(sockets, identifier):
-    """The socket with this identifier, or None. Names may repeat, identifiers do not."""
-    return next((s for s in sockets if s.identifier == identifier), None)
-
-
-def source_socket(socket, path=()):
-    """The socket that an input's value comes from, and its path, past reroutes, muted nodes and group borders.
-
-    The socket is an output, or the input that holds the value, or None if a muted node cuts the link.
-    """
-    while socket.is_linked and not socket.links[0].is_muted:
-        output, node = socket.links[0].from_socket, socket.links[0].from_node
-        inner = None
-        if node.type == "REROUTE":
-            inner = node.inputs[0]
-        elif node.mute:
-            inner = next((i.from_socket for i in node.internal_links if i.to_socket == output), None)
-            if inner is None:
-                return None, path
-        elif node.type == "GROUP" and node.node_tree is not None:
-            end = group_output(node.node_tree)
-            inner = find_socket(end.inputs, output.identifier) if end is not None else None
-            if inner is None:
-                return None, path
-            path += (node,)
-        elif node.type == "GROUP_INPUT" and path:
-            inner, path = find_socket(path[-1].inputs, output.identifier), path[:-1]
-        if inner is None:
-            return output, path
-        socket = inner
-    return socket, path
-
-
-def group_output(tree):
-    """The active output node of a group, or None."""
-    ends = [n for n in tree.nodes if n.type == "GROUP_OUTPUT"]
-    return next((n for n in ends if n.is_active_output), ends[0] if ends else None)
-
-
-def upstream(socket, path=(), seen=None):
-    """All nodes that an input socket's value depends on, each with the output that is used."""
-    seen = {} if seen is None else seen
-    output, path = source_socket(socket, path)
-    if output is None or not output.is_output:
-        return seen
-    key = (output.node.as_pointer(), output.identifier, tuple(n.as_pointer() for n in path))
-    if key not in seen:
-        seen[key] = (output.node, output)
-        for inner in output.node.inputs:
-            upstream(inner, path, seen)
-    return seen
 
 
 def is_constant(value):
@@ -138,26 +85,21 @@ class Graph:
 
     def value(self, socket, path=()):
         """The value of an input socket at any group depth."""
+        held = constant(socket, path)
+        if held is not None:
+            return held
         output, path = source_socket(socket, path)
-        if output is None:
-            return (0.0,) * 3 if socket.type in {"RGBA", "VECTOR"} else 0.0
-        if not output.is_output or output.node.type in {"VALUE", "RGB"}:
-            value = output.default_value
-            value = tuple(value)[:3] if hasattr(value, "__len__") else float(value)
-            if isinstance(value, float) and socket.type in {"RGBA", "VECTOR"}:
-                value = (value,) * 3
-            if isinstance(value, tuple) and socket.type == "VALUE":
-                value = 0.2126 * value[0] + 0.7152 * value[1] + 0.0722 * value[2]
-            return value
         top = self._top(output, path)
-        return top if socket.type in {"RGBA", "VECTOR"} or top.type == "VALUE" else self.multiply(self.grey(top), 1.0)
+        if socket.type in {"RGBA", "VECTOR"} or top.type == "VALUE":
+            return top
+        return self.multiply(self.mean(top) if top.type == "VECTOR" else self.grey(top), 1.0)
 
     def grey(self, value):
         """A value as one number: colours become their luminance, as in Cycles."""
         if not is_colour(value):
             return value
         if is_constant(value):
-            return 0.2126 * value[0] + 0.7152 * value[1] + 0.0722 * value[2]
+            return luminance(value)
         node = self.tree.nodes.new("ShaderNodeRGBToBW")
         self.tree.links.new(value, node.inputs[0])
         return node.outputs[0]

@@ -15,8 +15,8 @@ from mathutils import Matrix
 import glb
 import lamp_nodes
 import panorama
-from graph import FUNCTIONS, upstream
-from shading import nodes_of, output_of
+from graph import FUNCTIONS
+from shading import nodes_of, output_of, upstream
 
 _PIXELS = 256  # along the longer side
 _SAMPLES = 16

@@ -22,28 +22,28 @@ def found(light):
     """The IES profile that shapes the light of a point or spot lamp: its text (bytes), and the factor on the lamp's
     strength for each candela. None if the nodes do anything else with a profile, or the profile is missing."""
     output = output_of(nodes_of(light))
-    shader = source(output.inputs["Surface"]) if output is not None else None
+    shader, path = source(output.inputs["Surface"]) if output is not None else (None, ())
     if light.type not in {"POINT", "SPOT"} or shader is None or shader.type != "EMISSION":
         return None
-    node, factor = _profile(shader.inputs["Strength"], 1.0)
+    node, factor = _profile(shader.inputs["Strength"], path, 1.0)
     text = _text(node) if node is not None else None
     return (_smoothed(text), factor * _CANDELA) if text else None
 
 
-def _profile(socket, factor):
+def _profile(socket, path, factor):
     """The IES node that gives the value of a socket, and the constant factor on it; (None, factor) without one."""
-    node = source(socket)
-    if node is None or node.mute:
+    node, path = source(socket, path)
+    if node is None:
         return None, factor
     if node.type == "TEX_IES":
-        strength = constant(node.inputs["Strength"])
-        plain = not node.inputs["Vector"].is_linked and strength is not None and strength >= 0
+        strength = constant(node.inputs["Strength"], path)
+        plain = source(node.inputs["Vector"], path)[0] is None and strength is not None and strength >= 0
         return (node, factor * strength) if plain else (None, factor)
     if node.type == "MATH" and node.operation == "MULTIPLY" and not node.use_clamp:
         for own, other in ((0, 1), (1, 0)):
-            number = constant(node.inputs[other])
-            if number is not None and number >= 0 and source(node.inputs[own]) is not None:
-                return _profile(node.inputs[own], factor * number)
+            number = constant(node.inputs[other], path)
+            if number is not None and number >= 0 and source(node.inputs[own], path)[0] is not None:
+                return _profile(node.inputs[own], path, factor * number)
     return None, factor
 
 

@@ -11,8 +11,8 @@ import export_guard as guard
 import lamp_nodes
 import lamp_pictures
 import lamp_profiles
-from graph import FUNCTIONS, upstream
-from shading import constant, nodes_of, output_of, source
+from graph import FUNCTIONS
+from shading import constant, nodes_of, output_of, positive, source, upstream
 
 _DISC_SIDES = 64
 # Cells along each side of an area lamp with a picture.
@@ -21,11 +21,13 @@ _CELLS = 16
 _SOFT_RADII = 7
 
 
-def emission_node(light):
-    """The Emission node of a lamp, or None."""
+def _emission(light):
+    """Strength and colour of the Emission node of a lamp, each None if it varies; (None, None) for other nodes."""
     output = output_of(nodes_of(light))
-    shader = source(output.inputs["Surface"]) if output is not None else None
-    return shader if shader is not None and shader.type == "EMISSION" else None
+    shader, path = source(output.inputs["Surface"]) if output is not None else (None, ())
+    if shader is None or shader.type != "EMISSION":
+        return None, None
+    return constant(shader.inputs["Strength"], path), _colour(shader.inputs["Color"], path)
 
 
 def _power(light, factors):
@@ -34,21 +36,20 @@ def _power(light, factors):
     tint = list(light.color)
     if getattr(light, "use_temperature", False):
         tint = [a * b for a, b in zip(tint, light.temperature_color)]
-    node = emission_node(light)
+    strength, colour = _emission(light)
     if light.name in factors:
         tint = [a * b for a, b in zip(tint, factors[light.name])]
-    elif node is not None:
-        power *= constant(node.inputs["Strength"])
-        tint = [a * b for a, b in zip(tint, _colour(node.inputs["Color"]))]
+    elif strength is not None and colour is not None:
+        tint = [a * b * strength for a, b in zip(tint, colour)]
     return [c * power for c in tint]
 
 
-def _colour(socket):
+def _colour(socket, path):
     """The colour of a constant socket or of a blackbody of constant temperature, else None."""
-    node = source(socket)
+    node, inner = source(socket, path)
     if node is None or node.type != "BLACKBODY":
-        return constant(socket)
-    temperature = constant(node.inputs["Temperature"])
+        return constant(socket, path)
+    temperature = constant(node.inputs["Temperature"], inner)
     if temperature is None:
         return None
     colours = blackbodies([temperature])
@@ -69,19 +70,18 @@ def blackbodies(temperatures):
         bpy.data.lights.remove(bulb)
 
 
-def area_radiance(light, scale=(1, 1), factors=()):
-    """Radiance L (W/sr/m2) of an area light, from its power pi L A. `scale`: the object's scale."""
+def area_radiance(light, power, scale):
+    """Radiance L (W/sr/m2) of an area light, from its power pi L A per channel. `scale`: the object's scale."""
     size_x, size_y = _size(light)
     area = size_x * scale[0] * size_y * scale[1] * (math.pi / 4 if light.shape in {"DISK", "ELLIPSE"} else 1)
     if not getattr(light, "normalize", True):
         area = 1  # the energy is per square metre
-    return [p / (math.pi * area) for p in _power(light, factors)]
+    return [p / (math.pi * area) for p in power]
 
 
-def punctual(light, factors=()):
-    """`color` and `intensity` (cd, or lx for a sun, at 683 lm/W) of a point, spot or sun lamp, with its nodes."""
-    power = _power(light, factors)
-    if light.type != "SUN" and not getattr(light, "normalize", True):
+def punctual(light, power):
+    """`color` and `intensity` (cd, or lx for a sun, at 683 lm/W) of a point, spot or sun lamp. `power`: per channel."""
+    if not getattr(light, "normalize", True):
         power = [p * light.area() for p in power]
     strongest = max(max(power), 1e-30)
     lumens = 683 * (1 if light.type == "SUN" else 1 / (4 * math.pi))
@@ -113,10 +113,16 @@ def _add_lamp(thing, flat, warn):
         picture = guard.attempt(warn, flat.where(thing), None, "its picture is not carried", _add_picture, thing, flat)
         if picture is None:
             _measure_nodes(thing, flat, warn)
+    power = positive(_power(light, flat.lamp_factors), lambda what: warn(flat.where(thing), what))
     if light.type == "AREA":
-        _area_mesh(thing, flat, picture)
+        _area_mesh(thing, flat, power, picture)
         flat.remove(thing)
-    elif light.type == "SUN":
+        return
+    # Blender's exporter misreads nodes, and fails on groups of them.
+    thing.data = flat.remove_later(light.copy())
+    lamp_nodes.switch_nodes_off(thing.data)
+    flat.lamps[thing.data.name] = {"name": light.name, **punctual(light, power)}
+    if light.type == "SUN":
         flat.add_extras(thing, angle_deg=math.degrees(light.angle))
     else:
         flat.add_extras(thing, radius=light.shadow_soft_size)
@@ -128,8 +134,7 @@ def _add_lamp(thing, flat, warn):
 
 def _add_profile(thing, flat):
     """Carry a lamp with an IES profile and a constant colour. Returns whether that is all that its nodes do."""
-    node = emission_node(thing.data)
-    colour = _colour(node.inputs["Color"]) if node is not None else None
+    _, colour = _emission(thing.data)
     factor = lamp_profiles.add(thing, flat) if colour is not None else None
     if factor is None:
         return False
@@ -152,7 +157,7 @@ def _add_picture(thing, flat):
     return picture if picture is True else picture / peak
 
 
-def _area_mesh(thing, flat, picture=None):
+def _area_mesh(thing, flat, power, picture=None):
     """A one-sided emissive mesh in place of an area lamp, with the picture of its light if it varies."""
     light, scale = thing.data, thing.matrix_world.to_scale()
     size_x, size_y = _size(light)
@@ -168,7 +173,7 @@ def _area_mesh(thing, flat, picture=None):
     name = flat.names[thing.name] + " (area light)"
     mesh = flat.remove_later(bpy.data.meshes.new(name))
     mesh.from_pydata(corners, [], faces)  # clockwise: the face points along -Z, as the light does
-    radiance = area_radiance(light, [abs(s) for s in scale[:2]], flat.lamp_factors)
+    radiance = area_radiance(light, power, [abs(s) for s in scale[:2]])
     strength = max(max(radiance), 1e-30)
     material = flat.remove_later(bpy.data.materials.new(name))
     if bpy.app.version < (5, 0, 0):
@@ -227,9 +232,7 @@ def _measure_nodes(thing, flat, warn):
     output = output_of(nodes_of(light))
     if output is None or light.name in flat.lamp_factors:
         return
-    node = emission_node(light)
-    profile = any(n.type == "TEX_IES" and n.outputs[0].is_linked for n in output.id_data.nodes)
-    if node is not None and constant(node.inputs["Strength"]) is not None and _colour(node.inputs["Color"]):
+    if None not in _emission(light):
         return
     distance = _usual_distance(thing, flat)
     depsgraph, place = bpy.context.evaluated_depsgraph_get(), thing.matrix_world
@@ -241,7 +244,7 @@ def _measure_nodes(thing, flat, warn):
     flat.lamp_factors[light.name] = lamp_nodes.strength(light, distance, lights_scene)
     kinds = {n.type for n, _ in upstream(output.inputs["Surface"]).values()}
     if not kinds <= FUNCTIONS | {"EMISSION", "ADD_SHADER", "MIX_SHADER"}:
-        what = "its IES profile is not carried" if profile else "its shader nodes are not carried"
+        what = "its IES profile is not carried" if "TEX_IES" in kinds else "its shader nodes are not carried"
         warn(flat.where(thing), f"{what}: it shines alike in all directions, with the mean strength of those that "
              f"meet objects, at {distance:.3g} m; "
              "give the nodes to a spot or an area light, whose pictures are carried")

@@ -7,6 +7,7 @@ import closures
 import standin
 from graph import Graph, is_constant
 from lobes import BLACK, WHITE, Lobe, Reader
+from shading import positive, source
 
 _DIFFUSE = {"BSDF_DIFFUSE", "SUBSURFACE_SCATTERING", "BSDF_TOON", "BSDF_HAIR", "BSDF_HAIR_PRINCIPLED"}
 _GLOSSY = {"BSDF_GLOSSY", "BSDF_ANISOTROPIC"}
@@ -27,7 +28,7 @@ def match(material, undo, say, stretched=False):
     graph = Graph(material, undo)
     if stretched:
         standin.read_normal_map_axes(graph)
-    socket, inside = graph.output.inputs["Surface"], graph.output.inputs["Volume"].is_linked
+    socket, inside = graph.output.inputs["Surface"], source(graph.output.inputs["Volume"])[0] is not None
     tree = closures.read(socket)
     if tree is None:
         return graph, replace(_film(WHITE), thin=False) if inside else Matched()
@@ -121,6 +122,9 @@ class _Match:
 
     def _emission(self, shining):
         g = self.graph
+        for i, (weight, colour, strength) in enumerate(shining):
+            if is_constant(colour) and is_constant(strength):
+                shining[i] = weight, tuple(positive([c * strength for c in colour], self.say)), 1.0
         if len(shining) == 1 and shining[0][0] == 1.0:
             return shining[0][1:]
         total = BLACK

@@ -10,9 +10,10 @@ import gltfmaterial
 import direct_images
 import standin
 from gltfmaterial import PLAIN
-from graph import is_constant, source_socket
+from graph import is_constant
 from lobes import METALLIC, ROUGH, ROUGH_METAL_WARNING
 from matching import Matched, match
+from shading import source, source_socket
 
 _PASSES = {
     "base": ("base",), "surface": ("transmission", "roughness", "metallic"),
@@ -137,7 +138,7 @@ class Plan:
 
     def _displacement(self):
         """Set `bumped`: in Cycles, displacement changes normals alone unless the material moves the surface."""
-        self.bumped = self.graph.output.inputs["Displacement"].is_linked
+        self.bumped = source(self.graph.output.inputs["Displacement"])[0] is not None
         method = getattr(self.material, "displacement_method", "BUMP")
         if self.bumped and method != "BUMP":
             self.say("true displacement is not carried; use a Displace modifier")

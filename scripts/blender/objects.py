@@ -21,8 +21,7 @@ import motion
 import standin
 import visibility
 import volumes
-from graph import upstream
-from shading import VOLUME, nodes_of, output_of
+from shading import VOLUME, nodes_of, output_of, source, upstream
 
 _SOLID = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 # Types of objects that are never visible in renders.
@@ -46,9 +45,11 @@ class FlatScene:
 
     `things`: its objects. `names`: names of the original objects and meshes. `hidden`: for each of `things`, the kinds
     of rays that do not hit it. `groups`: the light group of each, or None. `keys`: for each, keys of
-    `extras.caustique` that a property of Blender cannot hold. `lamp_factors`: for each measured lamp, the factors per channel of its nodes. `profiles`: the texts of IES profiles (bytes) that lamps name. `pictures`: PNGs
-    that spots throw. `volumes`: grids, material and name of volumes that become boxes. `stretched`: names of materials with normal maps that uneven scale stretches, found if the materials
-    may be baked (`bakes`). `motion`: how the objects move while the shutter is open.
+    `extras.caustique` that a property of Blender cannot hold. `lamp_factors`: for each measured lamp, the factors per
+    channel of its nodes. `lamps`: name, colour and intensity of each lamp by the name that the exporter writes.
+    `profiles`: the texts of IES profiles (bytes) that lamps name. `pictures`: PNGs that spots throw. `volumes`: grids,
+    material and name of volumes that become boxes. `stretched`: names of materials with normal maps that uneven scale
+    stretches, found if the materials may be baked (`bakes`). `motion`: how the objects move while the shutter is open.
     """
 
     def __init__(self, scene, undo, warn, bakes=True, only=None):
@@ -57,7 +58,7 @@ class FlatScene:
         layer = bpy.context.view_layer
         layer.update()
         self.things, self.names, self.hidden, self.groups, self.lamp_factors = [], {}, {}, {}, {}
-        self.keys, self._linking = {}, linking.Links()
+        self.keys, self.lamps, self._linking = {}, {}, linking.Links()
         self.profiles, self.pictures, self.volumes = [], [], []
         self.stretched, self._bakes = set(), bakes
         self._warn, self._meshes, self._shapes, self._made, self._applied = warn, {}, [], [], {}
@@ -376,7 +377,7 @@ def _relief(mesh):
         output = output_of(tree)
         if output is not None:
             found |= {node.type for node, _ in upstream(output.inputs["Surface"]).values()} & {"BUMP", "NORMAL_MAP"}
-            found |= {"BUMP"} if output.inputs["Displacement"].is_linked else set()
+            found |= {"BUMP"} if source(output.inputs["Displacement"])[0] is not None else set()
     return found
 
 

@@ -1,77 +1,148 @@
 """Node trees of materials, lights and the world, and interiors: solid glass (KHR_materials_volume), absorption and
-scattering of volume shaders, dispersion."""
+scattering of volume shaders, dispersion.
+
+A *path* lists the group nodes around a socket or a node, outermost first.
+"""
 
 import math
 
 # Custom property of a material whose medium varies in space: the index of its volume.
 VOLUME = "caustique_volume"
+# Custom property of a material whose faces emit from their front alone, which Cycles cannot express.
+ONE_SIDED = "caustique_one_sided"
+
 
 def nodes_of(block):
     """The node tree of a material, light or world, or None. In Blender 5 the switch is always on, but for lights of 5.0."""
     return block.node_tree if getattr(block, "use_nodes", True) else None
 
 
-def output_of(tree, target="CYCLES"):
-    """The active material, world or light output node of a node tree, or None."""
-    if tree is None:
-        return None
-    if hasattr(tree, "get_output_node"):
-        node = tree.get_output_node(target)
-        if node is not None:
-            return node
-    outputs = [n for n in tree.nodes if n.type in {"OUTPUT_MATERIAL", "OUTPUT_WORLD", "OUTPUT_LIGHT"}]
-    return next((n for n in outputs if n.is_active_output), outputs[0] if outputs else None)
+def output_of(tree):
+    """The material, world or light output node of a node tree that Cycles uses, or None."""
+    return tree.get_output_node("CYCLES") if tree is not None else None
 
 
-def source(socket):
-    """The node linked to a socket, past reroutes, or None."""
-    while socket is not None and socket.is_linked:
-        node = socket.links[0].from_node
-        if node.type != "REROUTE":
-            return node
-        socket = node.inputs[0]
-    return None
+def find_socket(sockets, identifier):
+    """The socket with this identifier, or None. Names may repeat, identifiers do not."""
+    return next((s for s in sockets if s.identifier == identifier), None)
 
 
-def constant(socket, fallback=None):
-    """The value of an unlinked socket: a float or a list of three. `fallback` if it is linked."""
-    node = source(socket)
-    if node is None:
-        value = socket.default_value
-    elif node.type in {"VALUE", "RGB"}:
-        value = node.outputs[0].default_value
-    else:
+def source_socket(socket, path=()):
+    """The socket that an input's value comes from, and its path, past reroutes, muted nodes and group borders.
+
+    The socket is an output, or the input that holds the value, or None if a group lacks the output.
+    """
+    while socket.is_linked and not socket.links[0].is_muted:
+        output, node = socket.links[0].from_socket, socket.links[0].from_node
+        inner = None
+        if node.type == "REROUTE":
+            inner = node.inputs[0]
+        elif node.mute:
+            inner = next((i.from_socket for i in node.internal_links if i.to_socket == output), None)
+            if inner is None:
+                return socket, path  # as in Cycles, which drops the link
+        elif node.type == "GROUP" and node.node_tree is not None:
+            end = group_output(node.node_tree)
+            inner = find_socket(end.inputs, output.identifier) if end is not None else None
+            if inner is None:
+                return None, path
+            path += (node,)
+        elif node.type == "GROUP_INPUT" and path:
+            inner, path = find_socket(path[-1].inputs, output.identifier), path[:-1]
+        if inner is None:
+            return output, path
+        socket = inner
+    return socket, path
+
+
+def group_output(tree):
+    """The active output node of a group, or None."""
+    ends = [n for n in tree.nodes if n.type == "GROUP_OUTPUT"]
+    return next((n for n in ends if n.is_active_output), ends[0] if ends else None)
+
+
+def upstream(socket, path=(), seen=None):
+    """All nodes that an input socket's value depends on, each with the output that is used."""
+    seen = {} if seen is None else seen
+    output, path = source_socket(socket, path)
+    if output is None or not output.is_output:
+        return seen
+    key = (output.node.as_pointer(), output.identifier, tuple(n.as_pointer() for n in path))
+    if key not in seen:
+        seen[key] = (output.node, output)
+        for inner in output.node.inputs:
+            upstream(inner, path, seen)
+    return seen
+
+
+def source(socket, path=()):
+    """The node that an input's value comes from, or None, and its path."""
+    output, path = source_socket(socket, path)
+    return (output.node if output is not None and output.is_output else None), path
+
+
+def luminance(colour):
+    """The luminance of a linear colour, which Cycles links to numbers."""
+    return 0.2126 * colour[0] + 0.7152 * colour[1] + 0.0722 * colour[2]
+
+
+def constant(socket, path=(), fallback=None):
+    """The value of an input if it is constant, else `fallback`: a float, or three for a colour or vector."""
+    output, path = source_socket(socket, path)
+    if output is not None and output.is_output and output.node.type not in {"VALUE", "RGB"}:
         return fallback
-    return float(value) if isinstance(value, (int, float)) else [float(x) for x in value][:3]
+    value = output.default_value if output is not None else 0.0
+    if socket.type in {"RGBA", "VECTOR"}:
+        return tuple(map(float, value))[:3] if hasattr(value, "__len__") else (float(value),) * 3
+    if not hasattr(value, "__len__"):
+        return float(value)
+    return sum(value) / 3 if output.type == "VECTOR" else luminance(value)  # as Cycles converts them
 
 
-def leaves(node):
-    """The shaders below the mixes and sums of a shader tree."""
+def positive(light, say):
+    """The components of emitted light. `say` receives a warning if some are negative, which become 0."""
+    if min(light) < 0:
+        say("its light is negative, which Cycles subtracts: here it is 0; use a darker material, or less light")
+    return [max(component, 0.0) for component in light]
+
+
+def leaves(socket, path=()):
+    """The shaders below the mixes and sums at a shader input, each with its path."""
+    node, path = source(socket, path)
     if node is None:
         return []
     if node.type in {"MIX_SHADER", "ADD_SHADER"}:
-        sockets = [s for s in node.inputs if s.type == "SHADER"]
-        return [leaf for s in sockets for leaf in leaves(source(s))]
-    return [node]
+        return [leaf for s in node.inputs if s.type == "SHADER" for leaf in leaves(s, path)]
+    return [(node, path)]
+
+
+def warn_of_phase(shader, where, warn):
+    """Warn of a volume shader that scatters by another phase function than Henyey and Greenstein's."""
+    if getattr(shader, "phase", "HENYEY_GREENSTEIN") != "HENYEY_GREENSTEIN":
+        warn(where, "its phase function is taken for Henyey-Greenstein; "
+                    "choose Phase > Henyey-Greenstein to see the same in both")
 
 
 def medium(volume, where, warn):
-    """Coefficients (sigma_a, sigma_s, g) in 1/m of a volume shader, as Cycles defines them, or None if empty."""
+    """Coefficients (sigma_a, sigma_s, g) in 1/m of the shader at a Volume input, as in Cycles, or None if empty."""
     sigma_a, sigma_s, moment = [0.0] * 3, [0.0] * 3, 0.0
 
-    def add(node, weight):
+    def add(socket, path, weight):
         nonlocal moment
+        node, path = source(socket, path)
         if node is None:
             return
-        values = {s.identifier: constant(s) for s in node.inputs if s.type in {"VALUE", "RGBA", "VECTOR"}}
+        # Inputs that the phase function does not use are not enabled.
+        values = {s.identifier: constant(s, path) for s in node.inputs
+                  if s.enabled and s.type in {"VALUE", "RGBA", "VECTOR"}}
         density = values.get("Density", 1.0)
         if node.type == "ADD_SHADER":
             for socket in node.inputs:
-                add(source(socket), weight)
+                add(socket, path, weight)
             return
         if node.type == "MIX_SHADER" and values.get("Fac") is not None:
-            add(source(node.inputs[1]), weight * (1 - values["Fac"]))
-            add(source(node.inputs[2]), weight * values["Fac"])
+            add(node.inputs[1], path, weight * (1 - values["Fac"]))
+            add(node.inputs[2], path, weight * values["Fac"])
             return
         if any(v is None for v in values.values()):
             warn(where, f"the {node.bl_label} node varies in space: it is not carried; "
@@ -94,13 +165,14 @@ def medium(volume, where, warn):
         else:
             warn(where, f"the {node.bl_label} node is not a volume that can be carried; "
                         "use Volume Absorption, Volume Scatter or Principled Volume")
+        warn_of_phase(node, where, warn)
         g = values.get("Anisotropy", 0.0)
         for i in range(3):
             sigma_a[i] += weight * max(absorb[i], 0)
             sigma_s[i] += weight * max(scatter[i], 0)
         moment += g * weight * sum(scatter) / 3
 
-    add(volume, 1.0)
+    add(volume, (), 1.0)
     if not any(sigma_a + sigma_s):
         return None
     total = sum(sigma_s) / 3
@@ -116,7 +188,7 @@ def finish(entry, material, closed, thickness, warn):
     output = output_of(nodes_of(material))
     extensions = entry.setdefault("extensions", {})
     varies = VOLUME in material
-    inside = medium(source(output.inputs["Volume"]), where, warn) if output is not None and not varies else None
+    inside = medium(output.inputs["Volume"], where, warn) if output is not None and not varies else None
     clear = extensions.get("KHR_materials_transmission")
     if extensions.get("KHR_materials_volume") == {"thicknessFactor": 0}:  # a film, closed mesh or not
         if inside is not None:

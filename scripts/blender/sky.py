@@ -11,7 +11,7 @@ from mathutils import Vector
 
 import bake_cache
 import panorama
-from shading import nodes_of
+from shading import nodes_of, output_of, upstream
 
 # A sun in the sky: the direction towards it, its irradiance per channel (W/m2), and the angle of its disc (rad).
 Sun = collections.namedtuple("Sun", "toward irradiance angle")
@@ -26,7 +26,8 @@ def sun(scene, undo, where, warn):
 
     In an image the disc would be blurred over its texels, and so would its caustics.
     """
-    skies = [node for node in nodes_of(scene.world).nodes if node.type == "TEX_SKY" and node.outputs[0].is_linked]
+    used = upstream(output_of(nodes_of(scene.world)).inputs["Surface"])
+    skies = [node for node, _ in used.values() if node.type == "TEX_SKY"]
     discs = [node for node in skies if node.sky_type not in _SKIES_WITHOUT_SUN and node.sun_disc]
     if not discs:
         return None

@@ -104,6 +104,8 @@ class Surfaces:
 
     def _finish(self, entry, surface, writer, closed, least):
         entry["name"] = surface.material.name
+        # Cycles ignores Backface Culling, a setting of EEVEE.
+        entry["doubleSided"] = shading.ONE_SIDED not in surface.material
         channels, inside = surface.channels, surface.channels["subsurface"]
         if inside is not None and not closed:
             self.warn(f'material "{surface.material.name}"',

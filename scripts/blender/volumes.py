@@ -11,7 +11,7 @@ import numpy
 from mathutils import Matrix, Vector
 
 import lighting
-from shading import VOLUME, constant, leaves, nodes_of, output_of, source
+from shading import VOLUME, constant, leaves, nodes_of, output_of, source, source_socket, warn_of_phase
 
 # Stefan-Boltzmann constant over pi, in the unit of Cycles' Principled Volume.
 _BLACKBODY = 5.670373e-8 * 1e-6 / numpy.pi
@@ -94,8 +94,9 @@ def box(thing, warn):
     path = bpy.path.abspath(data.grids.frame_filepath or data.filepath)
     slot = thing.material_slots[0].material if thing.material_slots else None
     output = output_of(nodes_of(slot)) if slot is not None else None
-    shaders = [s for s in leaves(source(output.inputs["Volume"])) if s.type in _KEPT] if output is not None else []
-    names = {name for _, name in filter(None, map(_density, shaders)) if name}
+    shaders = leaves(output.inputs["Volume"]) if output is not None else []
+    densities = [_density(shader, around) for shader, around in shaders if shader.type in _KEPT]
+    names = {name for _, name in filter(None, densities) if name}
     if len(names) != 1:
         warn(where, "its density is not one grid times a number: it is left out; "
                     "link an Attribute node to Density, at most times a number")
@@ -116,11 +117,11 @@ def box(thing, warn):
     return mesh, volume, slot.original
 
 
-def _density(shader):
-    """Factor and grid of the density of a volume shader; None if it is something else."""
+def _density(shader, around):
+    """Factor and grid of the density of a volume shader in the groups `around`; None if it is something else."""
     if shader.type == "VOLUME_COEFFICIENTS":
         return None
-    found = _grid(shader.inputs["Density"])
+    found = _grid(shader.inputs["Density"], around)
     if shader.type != "PRINCIPLED_VOLUME" or found is None:
         return found
     factor, name = found
@@ -128,19 +129,20 @@ def _density(shader):
     return None if name and own else (factor, name or own)
 
 
-def _grid(socket):
+def _grid(socket, around):
     """Factor and name of the grid that a socket reads, as `density` or `density * 2`; the name is None for a constant,
     and the result None for other nodes."""
-    node = source(socket)
-    if node is None or node.type == "VALUE":
-        return constant(socket), None
+    value = constant(socket, around)
+    if value is not None:
+        return value, None
+    output, around = source_socket(socket, around)
+    node = output.node
     if node.type == "ATTRIBUTE":
         return 1.0, node.attribute_name
     if node.type == "VOLUME_INFO":
-        output = socket.links[0].from_socket.name
-        return (1.0, {"Density": "density", "Flame": "flame", "Temperature": "temperature"}.get(output, output.lower()))
+        return 1.0, output.name.lower()
     if node.type == "MATH" and node.operation == "MULTIPLY" and not node.use_clamp:
-        parts = [_grid(s) for s in node.inputs[:2]]
+        parts = [_grid(s, around) for s in node.inputs[:2]]
         if None not in parts and not all(name for _, name in parts):
             return parts[0][0] * parts[1][0], parts[0][1] or parts[1][1]
     return None
@@ -150,15 +152,15 @@ def medium(material, volume, where, warn):
     """The coefficients at density 1 and the emission (array of voxels and RGB, or None) of a volume object's material."""
     sigma_a, sigma_s, moment, glow = [0.0] * 3, [0.0] * 3, 0.0, None
     tree = output_of(nodes_of(material)).inputs["Volume"]
-    for shader in leaves(source(tree)):
-        density = _density(shader) if shader.type in _KEPT else None
-        values = {s.name: constant(s) for s in shader.inputs if s.type in {"VALUE", "RGBA"}}
+    for shader, around in leaves(tree):
+        density = _density(shader, around) if shader.type in _KEPT else None
+        values = {s.name: constant(s, around) for s in shader.inputs if s.enabled and s.type in {"VALUE", "RGBA"}}
         needed = {name for name in values if name in ("Color", "Anisotropy", "Absorption Color")}
         if density is None or not density[1] or any(values[name] is None for name in needed):
             warn(where, f"the {shader.bl_label} node is not one grid times constants: it is not carried; "
                         "link an Attribute node to Density, and unlink the other inputs")
             continue
-        if source(tree) is not shader and source(tree).type == "MIX_SHADER":
+        if source(tree)[0].type == "MIX_SHADER":
             warn(where, "the weights of mixed volumes are not carried; "
                         "multiply Density by the weight instead")
         factor = density[0] / volume.scale
@@ -173,11 +175,9 @@ def medium(material, volume, where, warn):
             if volume.has(shader.inputs["Color Attribute"].default_value):
                 warn(where, "the colours of the volume's grid are not carried; "
                             "clear Color Attribute, and choose one Color")
-            own = _emission(shader, volume, where, warn)
+            own = _emission(shader, around, volume, where, warn)
             glow = own if glow is None or own is None else glow + own
-        elif shader.type == "VOLUME_SCATTER" and getattr(shader, "phase", "HENYEY_GREENSTEIN") != "HENYEY_GREENSTEIN":
-            warn(where, "its phase function is taken for Henyey-Greenstein; "
-                        "choose Phase > Henyey-Greenstein to see the same in both")
+        warn_of_phase(shader, where, warn)
         for i in range(3):
             sigma_a[i] += max(absorb[i], 0)
             sigma_s[i] += max(scatter[i], 0)
@@ -186,11 +186,12 @@ def medium(material, volume, where, warn):
     return {"sigma_a": sigma_a, "sigma_s": sigma_s, "g": moment / total if total else 0.0}, glow
 
 
-def _emission(shader, volume, where, warn):
-    """Emission of a Principled Volume as Cycles defines it, by voxel and channel; None without."""
+def _emission(shader, around, volume, where, warn):
+    """Emission of a Principled Volume in the groups `around` as in Cycles, by voxel and channel; None without."""
     inside = (volume.density > 0)[..., None]
     glow = numpy.zeros((*volume.density.shape, 3))
-    strength, colour = _grid(shader.inputs["Emission Strength"]), constant(shader.inputs["Emission Color"])
+    strength = _grid(shader.inputs["Emission Strength"], around)
+    colour = constant(shader.inputs["Emission Color"], around)
     if strength is None or colour is None:
         warn(where, "its emission is not one grid times constants: it is not carried; "
                     "link an Attribute node to Emission Strength, and unlink Emission Color")
@@ -201,8 +202,8 @@ def _emission(shader, volume, where, warn):
                                                  "write all grids with voxels of one size")
         else:
             glow += strength[0] * numpy.asarray(by)[..., None] * colour
-    intensity, tint = constant(shader.inputs["Blackbody Intensity"]), constant(shader.inputs["Blackbody Tint"])
-    temperature = constant(shader.inputs["Temperature"])
+    intensity, tint, temperature = (constant(shader.inputs[name], around)
+                                    for name in ("Blackbody Intensity", "Blackbody Tint", "Temperature"))
     if None in (intensity, tint, temperature):
         warn(where, "its blackbody is not constant: it is not carried; "
                     "unlink Blackbody Intensity, Blackbody Tint and Temperature")

@@ -9,11 +9,13 @@ import bpy
 import export_guard as guard
 import sky
 import visibility
-from direct_images import is_missing, warn_of_missing
-from shading import constant, medium, nodes_of, output_of, source
-
+from direct_images import is_missing, texels, warn_of_missing
+from shading import constant, medium, nodes_of, output_of, positive, source, source_socket, upstream
 
 _STILL = {"FILE", "GENERATED", "VIEWER"}  # kinds of images that do not depend on the frame
+_ENDINGS = {"HDR": ".hdr", "OPEN_EXR": ".exr"}
+_LINEAR = {"Linear Rec.709", "Non-Color"}  # colour spaces of files whose numbers the program takes for radiances
+_BAKED_TEXELS = 1024, 4096  # least and most texels along the width of a baked world
 
 
 def extras(scene, path, warn):
@@ -21,29 +23,32 @@ def extras(scene, path, warn):
 
     Writes images beside the .glb at `path`.
     """
-    black = {"environment": {"color": [0.0, 0.0, 0.0]}}
-    if scene.world is None or not visibility.rendered_layer(scene).use_sky:  # the layer's filter "Environment"
-        return black, None
-    return guard.attempt(warn, f'world "{scene.world.name}"', (black, None), "it is black",
-                         _world, scene, path, black, warn)
+    said, disc = {"environment": {"color": [0.0, 0.0, 0.0]}}, None
+    if scene.world is not None and visibility.rendered_layer(scene).use_sky:  # the layer's filter "Environment"
+        said, disc = guard.attempt(warn, f'world "{scene.world.name}"', (said, None), "it is black",
+                                   _world, scene, path, warn)
+    if not any(said["environment"].get("color", [1.0])):
+        # A black world is opaque in Cycles; without the key it would count as none.
+        said["environment"].setdefault("background", {"color": [0.0, 0.0, 0.0]})
+    return said, disc
 
 
-def _world(scene, path, black, warn):
-    world, said = scene.world, dict(black, environment=dict(black["environment"]))
+def _world(scene, path, warn):
+    world, said = scene.world, {"environment": {"color": [0.0, 0.0, 0.0]}}
     where = f'world "{world.name}"'
     output = output_of(nodes_of(world))
     if output is None:
         if nodes_of(world) is None:
             said["environment"]["color"] = list(world.color)
         return said, None
-    inside = medium(source(output.inputs["Volume"]), where, warn)
+    inside = medium(output.inputs["Volume"], where, warn)
     if inside is not None:
         said["medium"] = inside
-    warn_of_missing([output.id_data], where, warn)
-    shader = source(output.inputs["Surface"])
-    if shader is None:
+    used = list(upstream(output.inputs["Surface"]).values())
+    warn_of_missing({node.id_data for node, _ in used}, where, warn)
+    if not used:
         return said, None
-    by_ray = [s for node in output.id_data.nodes if node.type == "LIGHT_PATH" for s in node.outputs if s.is_linked]
+    by_ray = list(dict.fromkeys(socket for node, socket in used if node.type == "LIGHT_PATH"))
     background = None
     with contextlib.ExitStack() as undo:
         for socket in by_ray:
@@ -71,16 +76,25 @@ def _world(scene, path, black, warn):
 def _environment(scene, output, path, name, find_sun, warn):
     """The key `environment` of the world's surface, and what `find_sun` returns if the world is baked, to an image with
     `name` in its file name."""
-    shader = source(output.inputs["Surface"])
-    while shader is not None and shader.type == "MIX_SHADER" and constant(shader.inputs[0]) in {0.0, 1.0}:
-        shader = source(shader.inputs[1 + int(constant(shader.inputs[0]))])
+    where = f'world "{scene.world.name}"'
+    shader, around = source(output.inputs["Surface"])
+    while shader is not None and shader.type == "MIX_SHADER" and constant(shader.inputs[0], around) in {0.0, 1.0}:
+        shader, around = source(shader.inputs[1 + int(constant(shader.inputs[0], around))], around)
     if shader is None:
         return {"color": [0.0, 0.0, 0.0]}, None
-    said, found = _background(shader, path), None
+
+    def bake():
+        used = upstream(output.inputs["Surface"]).values()
+        images = [node.image for node, _ in used if node.type == "TEX_ENVIRONMENT"]
+        least, most = _BAKED_TEXELS
+        width = min(max([least, *(image.size[0] for image in images if image is not None)]), most)
+        return sky.bake_world(scene, path, width, kind=name)
+
+    said, found = _background(shader, around, path, bake, where, warn), None
     if said is None:
         found = find_sun()
-        said = sky.bake_world(scene, path, kind=name)
-        warn(f'world "{scene.world.name}"', f"its nodes are baked to {said['file']}; keep that file beside the scene's file")
+        said = bake()
+        warn(where, f"its nodes are baked to {said['file']}; keep that file beside the scene's file")
     return said, found
 
 
@@ -102,84 +116,82 @@ def _add_visibility(world, environment, where, warn):
     shown = getattr(world, "cycles_visibility", None)
     hidden = [name for name in rays if not getattr(shown, name, True)]
     if "camera" in hidden:
-        environment["visible"] = {"camera": False}
+        environment["background"] = {"color": [0.0, 0.0, 0.0]}
         hidden.remove("camera")
     if hidden:
         warn(where, f"it is hidden from {', '.join(rays[name] for name in hidden)} rays in Cycles: here they meet it; "
                     "switch these rays on (World > Ray Visibility) to see the same in Cycles")
 
 
-def _background(shader, path):
-    """The environment of a Background shader with one colour or one rotated environment texture; None for others."""
-    if shader.type not in {"BACKGROUND", "EMISSION"} or constant(shader.inputs["Strength"]) is None:
+def _background(shader, around, path, bake, where, warn):
+    """The environment of a Background shader in the groups `around` with one colour or one rotated environment texture,
+    which `bake` writes if the program cannot read its image; None for others."""
+    if shader.type not in {"BACKGROUND", "EMISSION"} or constant(shader.inputs["Strength"], around) is None:
         return None
-    strength = constant(shader.inputs["Strength"])
-    colour = constant(shader.inputs["Color"])
+    strength = constant(shader.inputs["Strength"], around)
+    colour = constant(shader.inputs["Color"], around)
     if colour is not None:
-        return {"color": [c * strength for c in colour]}
-    texture = source(shader.inputs["Color"])
+        return {"color": positive([c * strength for c in colour], lambda what: warn(where, what))}
+    texture, around = source(shader.inputs["Color"], around)
     if texture.type == "TEX_ENVIRONMENT" and texture.image is not None and texture.image.source not in _STILL:
         return None
     if texture.type == "TEX_ENVIRONMENT" and is_missing(texture.image):
         return {"color": [strength, 0.0, strength]}  # magenta, as in Cycles
     if texture.type != "TEX_ENVIRONMENT" or texture.projection != "EQUIRECTANGULAR":
         return None
-    turn = _turn(texture.inputs["Vector"])
-    if turn is None:
+    turn = _turn(texture.inputs["Vector"], around)
+    if turn is None or strength < 0:
         return None
-    return {"file": _beside(texture.image, path), "rotation_deg": turn, "strength": strength}
+    file = _write_linear(texture.image, path)
+    return {"file": file, "rotation_deg": turn, "strength": strength} if file is not None else bake()
 
 
-def _turn(socket):
+def _turn(socket, around):
     """Rotation in degrees about the vertical by the nodes before an environment texture, or None if they do more."""
-    node = source(socket)
-    if node is None:
+    output, around = source_socket(socket, around)
+    if output is None or not output.is_output:
         return 0.0
+    node = output.node
     if node.type == "TEX_COORD":
-        return 0.0 if socket.links[0].from_socket.name == "Generated" else None
+        return 0.0 if output.name == "Generated" else None
     if node.type != "MAPPING" or node.vector_type not in {"POINT", "TEXTURE", "VECTOR", "NORMAL"}:
         return None
-    rotation = constant(node.inputs["Rotation"])
-    scale = constant(node.inputs["Scale"])
-    shift = constant(node.inputs["Location"]) if "Location" in node.inputs else [0, 0, 0]
-    moved = node.vector_type in {"POINT", "TEXTURE"} and shift != [0, 0, 0]
-    if rotation is None or scale != [1, 1, 1] or any(rotation[:2]) or moved:
+    rotation = constant(node.inputs["Rotation"], around)
+    scale = constant(node.inputs["Scale"], around)
+    shift = constant(node.inputs["Location"], around) if "Location" in node.inputs else (0, 0, 0)
+    moved = node.vector_type in {"POINT", "TEXTURE"} and shift != (0, 0, 0)
+    if rotation is None or scale != (1, 1, 1) or any(rotation[:2]) or moved:
         return None
-    before = _turn(node.inputs["Vector"])
+    before = _turn(node.inputs["Vector"], around)
     # A point mapping rotates the lookup direction, so the image rotates by the negative angle.
     return None if before is None else before + math.degrees(rotation[2]) * (1 if node.vector_type == "TEXTURE" else -1)
 
 
-def _beside(image, path):
-    """Write an image beside the .glb at `path`, as Radiance or OpenEXR. Returns its file name."""
+def _write_linear(image, path):
+    """Write an image of linear values beside the .glb at `path`, as Radiance or OpenEXR. Returns the file's name, or
+    None for images of bytes, which Cycles has to convert."""
     stem = os.path.splitext(os.path.basename(path))[0]
-    kind = {"HDR": ".hdr", "OPEN_EXR": ".exr", "OPEN_EXR_MULTILAYER": None}.get(image.file_format)
-    data = None
+    ending, data = _ENDINGS.get(image.file_format), None
     if image.packed_file is not None:
         data = image.packed_file.data
     elif image.source == "FILE" and os.path.isfile(bpy.path.abspath(image.filepath)):
         with open(bpy.path.abspath(image.filepath), "rb") as file:
             data = file.read()
-    if kind and data:
-        name = sky.unused_name(path, f"{stem}.environment{kind}")
+    if ending and data and image.colorspace_settings.name in _LINEAR:
+        name = sky.unused_name(path, f"{stem}.environment{ending}")
         with open(os.path.join(os.path.dirname(path), name), "wb") as file:
             file.write(data)
         return name
+    if not image.is_float or image.channels != 4:
+        return None
     name = sky.unused_name(path, f"{stem}.environment.exr")
     flat = bpy.data.images.new(name, *image.size, float_buffer=True)
     try:
-        pixels = list(image.pixels)
-        if image.colorspace_settings.name == "sRGB" and not image.is_float:
-            pixels = [v if i % 4 == 3 else _linear(v) for i, v in enumerate(pixels)]
-        flat.colorspace_settings.name = "Non-Color"  # no colour conversion
-        flat.pixels = pixels
+        flat.colorspace_settings.name = "Non-Color"  # Blender has converted the values when it read the file.
+        flat.pixels.foreach_set(texels(image).ravel())
         flat.file_format = "OPEN_EXR"
         flat.filepath_raw = os.path.join(os.path.dirname(path), name)
         flat.save()
     finally:
         bpy.data.images.remove(flat)
     return name
-
-
-def _linear(value):
-    return value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4

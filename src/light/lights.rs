@@ -101,7 +101,7 @@ impl Lights {
             }
         }
         emitters.extend(others);
-        if sky.environment.is_some() {
+        if sky.shines() {
             emitters.push(EnvironmentLight.into());
         }
         let indices = |which: &dyn Fn(&Emitter) -> bool| -> Vec<u32> {
@@ -189,7 +189,7 @@ impl Lights {
     #[inline]
     fn other_index(&self, light: u32, count: usize) -> Option<usize> {
         // They are the emitters between the triangles and the environment.
-        let last = self.emitters.len() - usize::from(self.sky.environment.is_some());
+        let last = self.emitters.len() - usize::from(self.sky.shines());
         (light as usize + count).checked_sub(last)
     }
 

@@ -26,6 +26,12 @@ pub struct Sky {
 }
 
 impl Sky {
+    /// Whether light comes from the environment, or cameras see some there. A black one only makes pictures opaque.
+    pub fn shines(&self) -> bool {
+        let black = |of: &Environment| matches!(of, Environment::Uniform(color) if *color == Rgb::ZERO);
+        [&self.environment, &self.background].into_iter().flatten().any(|of| !black(of))
+    }
+
     /// Area of the disc through which light from one direction enters the scene's bounding sphere (m2).
     pub(super) fn disc_area(&self) -> f64 {
         std::f64::consts::PI * f64::from(self.radius) * f64::from(self.radius)

@@ -30,7 +30,7 @@ impl Presence {
             let how = if used.material.transmission.factor > 0.0 { "through" } else { "in" };
             format!("caustics seen {how} {}", used.label())
         };
-        let environment = scene.lights.sky().environment.is_some();
+        let environment = scene.lights.sky().shines();
         let property = |effect| material_reasons(effect, &used);
         let because = Effect::ALL.map(|effect| {
             truncate_reasons(match effect {

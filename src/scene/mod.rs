@@ -189,7 +189,7 @@ impl Scene {
             }
             Owner::Environment => "the environment".into(),
             Owner::Light => {
-                let environment = usize::from(self.lights.sky().environment.is_some());
+                let environment = usize::from(self.lights.sky().shines());
                 let first = self.lights.emitters().len() - environment - self.light_names.len();
                 format!("light \"{}\"", self.light_names[index - first])
             }

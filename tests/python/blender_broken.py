@@ -14,6 +14,7 @@ import glb
 import lighting
 import material_plan
 import objects
+import shading
 import world
 from lab.features import torture_stage
 
@@ -116,11 +117,21 @@ class Broken(support.Scratch):
             with self.subTest(function), mock.patch.object(owner, function, self.planted(owner, function, strikes)):
                 names, warnings = self.write()
                 self.named(warnings, where, "planted fault", instead)
+                of_nodes = where.startswith(("material", "light", "world"))
+                self.named(warnings, where, "simplify its nodes" if of_nodes else "report the error with the file")
+                self.assertFalse(of_nodes and any("apply its modifiers" in line for line in warnings), warnings)
                 self.assertIn("floor", names)
                 if function == "match":
                     base = self.entry()["pbrMetallicRoughness"]["baseColorFactor"]
                     self.assertEqual([round(c, 4) for c in base], [0.1, 0.2, 0.3, 1])
                 self.assertEqual("extra" in names, function != "add")
+
+    def test_an_export_that_ends_names_the_material(self):
+        self.stage.principled()
+        planted = mock.patch.object(shading, "leaves", side_effect=TypeError("planted"))
+        with planted, self.assertRaises(TypeError) as end:
+            self.write()
+        self.assertRegex(end.exception.place, '^material "(tested|floor)"$')
 
     @staticmethod
     def planted(owner, function, strikes):

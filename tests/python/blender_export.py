@@ -51,6 +51,23 @@ def node_material(name, *shaders, mix=None, volume=None, **values):
     return material
 
 
+def group_of(kind, **values):
+    """A node group with one shader of this kind. `values`: its input values by name."""
+    group = bpy.data.node_groups.new("group", "ShaderNodeTree")
+    group.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
+    node, end = group.nodes.new(kind), group.nodes.new("NodeGroupOutput")
+    for name, value in values.items():
+        node.inputs[name].default_value = value
+    group.links.new(node.outputs[0], end.inputs[0])
+    return group
+
+
+def group_node(tree, group):
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = group
+    return node
+
+
 def cube(material, sides=6):
     corners = [(x, y, z) for x in (0, 2) for y in (0, 2) for z in (0, 0.5)]
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)][:sides]
@@ -208,6 +225,86 @@ class Export(unittest.TestCase):
         self.assertEqual(entry["extensions"]["KHR_materials_ior"]["ior"], 1)
         self.assertIn("KHR_materials_volume", entry["extensions"])
 
+    def test_volumes_in_groups_and_muted(self):
+        material = node_material("fog", volume="ShaderNodeVolumeScatter")
+        tree = material.node_tree
+        output = next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL")
+        group = group_node(tree, group_of("ShaderNodeVolumeScatter", Color=(0.5, 0.25, 0.125, 1), Density=4.0))
+        tree.links.new(group.outputs[0], output.inputs["Volume"])
+        entry, warnings = self.material(material)
+        self.assertEqual(entry["extras"]["caustique"]["medium"]["sigma_s"], [2, 1, 0.5])
+        self.assertEqual(warnings, [])
+        group.mute = True
+        self.assertNotIn("extras", self.write()[0]["materials"][0])
+
+    def test_numbers_in_colours_of_volumes(self):
+        material = node_material("w", "ShaderNodeBsdfGlass", volume="ShaderNodeVolumeAbsorption", Density=4.0)
+        tree = material.node_tree
+        number = tree.nodes.new("ShaderNodeValue")
+        number.outputs[0].default_value = 0.75
+        tree.links.new(number.outputs[0], next(n for n in tree.nodes if n.type == "VOLUME_ABSORPTION").inputs["Color"])
+        entry, warnings = self.material(material)
+        self.assertEqual(warnings, [])
+        self.assertAlmostEqual(entry["extensions"]["KHR_materials_volume"]["attenuationDistance"], 1, 6)
+
+    def test_phase_functions(self):
+        """Other phase functions than Henyey and Greenstein's are named in meshes and in the world."""
+        material = node_material("fog", volume="ShaderNodeVolumeScatter")
+        inner = next(n for n in material.node_tree.nodes if n.type == "VOLUME_SCATTER")
+        if not hasattr(inner, "phase"):
+            self.skipTest("Blender before 4.3 has one phase function")
+        world = bpy.context.scene.world = bpy.data.worlds.new("world")
+        if bpy.app.version < (5, 0, 0):
+            world.use_nodes = True
+        fog = world.node_tree.nodes.new("ShaderNodeVolumeScatter")
+        world.node_tree.links.new(
+            fog.outputs[0], next(n for n in world.node_tree.nodes if n.type == "OUTPUT_WORLD").inputs["Volume"])
+        cube(material)
+        for phase in ("RAYLEIGH", "MIE", "DRAINE", "FOURNIER_FORAND"):
+            fog.phase = inner.phase = phase
+            named = [line for line in self.write()[1] if "its phase function" in line]
+            self.assertEqual([line.split(":")[0] for line in named], ['world "world"', 'material "fog"'])
+
+    def test_colours_in_numbers(self):
+        """Numbers that are linked to a colour are its luminance."""
+        material = node_material("m", "ShaderNodeBsdfPrincipled")
+        tree = material.node_tree
+        colour = tree.nodes.new("ShaderNodeRGB")
+        colour.outputs[0].default_value = (1, 0, 0, 1)
+        shader = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
+        tree.links.new(colour.outputs[0], shader.inputs["Roughness"])
+        entry, warnings = self.material(material)
+        self.assertAlmostEqual(entry["pbrMetallicRoughness"]["roughnessFactor"], 0.2126, 4)
+        self.assertEqual(warnings, [])
+
+    def test_backface_culling_is_ignored(self):
+        material = node_material("m", "ShaderNodeBsdfPrincipled")
+        material.use_backface_culling = True
+        plain = bpy.data.materials.new("plain")
+        if bpy.app.version < (5, 0, 0):
+            plain.use_nodes = False
+        plain.use_backface_culling = True
+        cube(material)
+        cube(plain)
+        document, _ = self.write()
+        self.assertEqual([entry.get("doubleSided") for entry in document["materials"]], [True, True])
+
+    def test_materials_for_eevee_alone_are_black(self):
+        material = node_material("m", "ShaderNodeBsdfDiffuse", Color=(1, 1, 1, 1))
+        next(n for n in material.node_tree.nodes if n.type == "OUTPUT_MATERIAL").target = "EEVEE"
+        entry, _ = self.material(material)
+        self.assertEqual(entry["pbrMetallicRoughness"]["baseColorFactor"], [0, 0, 0, 1])
+
+    def test_negative_emission(self):
+        material = node_material("m", "ShaderNodeEmission")
+        number = material.node_tree.nodes.new("ShaderNodeValue")
+        number.outputs[0].default_value = -1
+        emission = next(n for n in material.node_tree.nodes if n.type == "EMISSION")
+        material.node_tree.links.new(number.outputs[0], emission.inputs["Strength"])
+        entry, warnings = self.material(material)
+        self.assertNotIn("emissiveFactor", entry)
+        self.assertIn('material "m": its light is negative', "".join(warnings))
+
     def test_abbe_number(self):
         material = node_material("flint", "ShaderNodeBsdfGlass")
         material["abbe"] = 40.0
@@ -298,7 +395,7 @@ class Export(unittest.TestCase):
         data.energy, data.color = 4 * math.pi, (1, 0.5, 0.5)
         if data.node_tree is None:  # from 5.1 on, every lamp has one
             data.use_nodes = True
-        node = lighting.emission_node(data)
+        node = next((n for n in data.node_tree.nodes if n.type == "EMISSION"), None)
         if node is None:
             tree = data.node_tree
             node = tree.nodes.new("ShaderNodeEmission")
@@ -399,6 +496,33 @@ class Export(unittest.TestCase):
             sky.bake_world(bpy.context.scene, self.path, 64)
             seen = pixels(os.path.join(self.folder.name, "scene.environment.exr")) / 2
             numpy.testing.assert_allclose(seen[1:-1], self.gradient(said["rotation_deg"])[1:-1, :, :3], atol=0.03, err_msg=f"{kind} {degrees}")
+
+    def test_environment_images_have_the_colours_of_cycles(self):
+        """Colour spaces and alpha of float and byte images, which are files or packed."""
+        for kind, space, alpha in (("OPEN_EXR", "ACEScg", 1.0), ("OPEN_EXR", "sRGB", 1.0),
+                                   ("OPEN_EXR", "Non-Color", 1.0), ("PNG", "sRGB", 0.5), ("PNG", "ACEScg", 1.0),
+                                   ("PNG", "Linear Rec.709", 1.0)):
+            for packs in (False, True):
+                picture = bpy.data.images.new("drawn", 16, 8, float_buffer=kind == "OPEN_EXR", alpha=True)
+                picture.pixels.foreach_set(numpy.tile(numpy.float32((0.9, 0.5, 0.1, alpha)), 128))
+                picture.file_format = kind
+                picture.filepath_raw = os.path.join(self.folder.name, f"sky.{kind[-3:].lower()}")
+                picture.save()
+                read = bpy.data.images.load(picture.filepath_raw)
+                read.colorspace_settings.name = space
+                if packs:
+                    read.pack()
+                self.world(read)
+                document, warnings = self.write()
+                self.assertEqual(warnings, [])
+                said = document["scenes"][0]["extras"]["caustique"]["environment"]
+                ours = pixels(os.path.join(self.folder.name, said["file"])).mean((0, 1)) * said["strength"]
+                with tempfile.TemporaryDirectory() as folder:
+                    baked = sky.bake_world(bpy.context.scene, os.path.join(folder, "x.glb"), 16)
+                    theirs = pixels(os.path.join(folder, baked["file"])).mean((0, 1))
+                numpy.testing.assert_allclose(ours, theirs, rtol=0.01, err_msg=f"{kind} {space} {alpha} {packs}")
+                bpy.data.images.remove(picture)
+                bpy.data.images.remove(read)
 
     def test_dome_puts_colours_where_cycles_sees_them(self):
         build.dome(lambda x, y, z: numpy.stack([2 + x, 2 + y, 2 + z], -1), 64)

@@ -172,6 +172,109 @@ class Lamps(cycles_comparison.CyclesComparison):
         tree = body.data.node_tree
         return tree, next(n for n in tree.nodes if n.type == "EMISSION")
 
+    def test_suns_without_normalize(self):
+        """The strength of a sun without Normalize is a radiance, so its light grows with its disc."""
+        self.floor()
+        eye((0, -3, 3), (0, 0, 0), lens=35)
+        for angle in (0.02, 0.5, math.pi):
+            with self.subTest(angle):
+                body = lamp("SUN", (0, 0, 2), 2 / angle ** 2, angle=angle, normalize=False)
+                self.alike(self.caustique(), self.cycles(), parts=1)
+                bpy.data.objects.remove(body)
+
+    def light(self, body, build):
+        """The intensity per channel (W/sr) in the file of a point lamp whose nodes `build(tree, emission)` changes."""
+        build(*self.nodes(body))
+        self.warnings = export.write(self.path)
+        lights = glb.read(self.path)[0]["extensions"]["KHR_lights_punctual"]["lights"]
+        self.assertEqual([light["name"] for light in lights], [body.data.name])
+        bpy.data.objects.remove(body)
+        return [round(c * lights[0]["intensity"] / 683, 4) for c in lights[0]["color"]]
+
+    def test_nodes_of_lamps_as_cycles_reads_them(self):
+        """Links between colours and numbers, muted links and nodes, and node groups."""
+        self.floor()
+
+        def linked(kind, value, socket, mute=None):
+            def build(tree, emission):
+                node = tree.nodes.new(kind)
+                node.outputs[0].default_value = value
+                link = tree.links.new(node.outputs[0], emission.inputs[socket])
+                if mute is not None:
+                    setattr(*((link, "is_muted") if mute == "link" else (node, "mute")), True)
+            return build
+
+        def muted(tree, emission):
+            emission.mute = True
+
+        def grouped(tree, emission):
+            group = shared.group_of("ShaderNodeEmission", Color=(0.5, 0.25, 1, 1))
+            strength = group.interface.new_socket("Strength", in_out="INPUT", socket_type="NodeSocketFloat")
+            inputs, inner = group.nodes.new("NodeGroupInput"), next(n for n in group.nodes if n.type == "EMISSION")
+            group.links.new(inputs.outputs[strength.identifier], inner.inputs["Strength"])
+            node = shared.group_node(tree, group)
+            node.inputs[0].default_value = 2
+            tree.links.new(node.outputs[0], next(n for n in tree.nodes if n.type == "OUTPUT_LIGHT").inputs["Surface"])
+
+        red, grey = (1, 0, 0, 1), [0.2126] * 3
+        for name, build, expected in (
+                ("colour to number", linked("ShaderNodeRGB", red, "Strength"), grey),
+                ("number to colour", linked("ShaderNodeValue", 0.25, "Color"), [0.25] * 3),
+                ("muted link", linked("ShaderNodeValue", 5, "Strength", "link"), [1, 1, 1]),
+                ("muted node", linked("ShaderNodeValue", 5, "Strength", "node"), [1, 1, 1]),
+                ("muted emission", muted, [0, 0, 0]),
+                ("group", grouped, [1, 0.5, 2])):
+            with self.subTest(name):
+                body = lamp("POINT", (0, 0, 2), 4 * math.pi, shadow_soft_size=0.0)
+                self.assertEqual(self.light(body, build), expected)
+                self.assertEqual(self.warnings, [])
+        self.light(lamp("POINT", (0, 0, 2), -4 * math.pi, shadow_soft_size=0.0), lambda tree, emission: None)
+        self.assertIn("its light is negative", "".join(self.warnings))
+
+    def environment(self):
+        """Export the scene. Returns its environment, with rounded colours."""
+        self.warnings = export.write(self.path)
+        said = glb.read(self.path)[0]["scenes"][0]["extras"]["caustique"]["environment"]
+        return [round(c, 3) for c in said["color"]], said.get("background")
+
+    def test_nodes_of_worlds_as_cycles_reads_them(self):
+        """Links between colours and numbers, muted links and nodes, and node groups."""
+        black = [0, 0, 0], {"color": [0, 0, 0]}
+
+        def add(kind, value, socket):
+            tree = self.world((1, 0.5, 0.25, 1)).node_tree
+            node = tree.nodes.new(kind)
+            node.outputs[0].default_value = value
+            return node, tree.links.new(node.outputs[0], background(self.scene.world).inputs[socket])
+
+        add("ShaderNodeRGB", (1, 0, 0, 1), "Strength")
+        self.assertEqual(self.environment(), ([0.213, 0.106, 0.053], None))
+        add("ShaderNodeValue", 0.25, "Color")
+        self.assertEqual(self.environment(), ([0.25] * 3, None))
+        add("ShaderNodeRGB", (1, 0, 0, 1), "Color")[1].is_muted = True
+        self.assertEqual(self.environment(), ([1, 0.5, 0.25], None))
+        add("ShaderNodeRGB", (1, 0, 0, 1), "Color")[0].mute = True
+        self.assertEqual(self.environment(), ([1, 0.5, 0.25], None))
+        add("ShaderNodeValue", -1, "Strength")
+        self.assertEqual(self.environment(), black)
+        self.assertIn("its light is negative", "".join(self.warnings))
+        tree = self.world((1, 0.5, 0.25, 1)).node_tree
+        background(self.scene.world).mute = True
+        self.assertEqual(self.environment(), black)
+        output = next(n for n in tree.nodes if n.type == "OUTPUT_WORLD")
+        for kind, socket in (("ShaderNodeBackground", "Surface"), ("ShaderNodeVolumeScatter", "Volume")):
+            group = shared.group_of(kind, Color=(1, 0.5, 0.25, 1))
+            tree.links.new(shared.group_node(tree, group).outputs[0], output.inputs[socket])
+        self.assertEqual(self.environment(), ([1, 0.5, 0.25], None))
+        self.assertEqual(self.warnings, [])
+        self.assertIn("medium", glb.read(self.path)[0]["scenes"][0]["extras"]["caustique"])
+        for node in tree.nodes:
+            node.mute = node.type == "GROUP"
+        self.assertEqual(self.environment(), black)
+        self.assertNotIn("medium", glb.read(self.path)[0]["scenes"][0]["extras"]["caustique"])
+        self.scene.world = None
+        self.assertEqual(self.environment(), black)
+
     def test_nodes_that_are_switched_off(self):
         """Lamps keep their nodes while these are switched off, before Blender 5.1."""
         body = lamp("POINT", (0, 0, 2), 4 * math.pi)
@@ -280,7 +383,7 @@ class Lamps(cycles_comparison.CyclesComparison):
         self.alike(self.caustique(32, "--method", "path"), self.cycles(64), parts=4)
         self.assertEqual(self.warnings, [])
         listed = json.loads(support.run(["info", self.path, "--json"], check=0).stdout)["lights"]
-        self.assertEqual(listed, {"spot with a picture": 1})
+        self.assertEqual(listed["spot with a picture"], 1)
         around, place = (tree.nodes.new("ShaderNode" + kind) for kind in ("TexCoord", "Mapping"))
         place.inputs["Location"].default_value = (0.5, 0.4, 0)
         tree.links.new(around.outputs["Normal"], place.inputs["Vector"])
@@ -392,6 +495,7 @@ class Lamps(cycles_comparison.CyclesComparison):
         self.assertEqual(self.warnings, [])
         world.cycles_visibility.glossy = False
         self.assertIn("hidden from glossy rays", export.write(self.path)[0])
+        world.cycles_visibility.camera = True
         paths, mix = (world.node_tree.nodes.new("ShaderNode" + kind) for kind in ("LightPath", "MixShader"))
         output = next(n for n in world.node_tree.nodes if n.type == "OUTPUT_WORLD")
         for socket, end in ((paths.outputs["Is Camera Ray"], mix.inputs[0]), (background(world).outputs[0], mix.inputs[2]),

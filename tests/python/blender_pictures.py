@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import math
 import os
 import unittest
 
@@ -28,6 +29,23 @@ class Pictures(cycles_comparison.CyclesComparison):
             ours, theirs = self.caustique(16), self.cycles(16)
             self.assertEqual(ours.shape, (height // 2, width // 2, 3))
             self.silhouettes_agree(ours, theirs)
+
+    def test_sensor_fit(self):
+        """Cameras of every sensor fit see the frame that Blender shows, in wide and in tall pictures."""
+        for fit in ("AUTO", "HORIZONTAL", "VERTICAL"):
+            for width, height in ((64, 32), (32, 64)):
+                self.scene.render.resolution_x, self.scene.render.resolution_y = width, height
+                for kind in ("PERSP", "ORTHO"):
+                    body = eye((0, 0, 5), (0, 0, 0), type=kind, sensor_fit=fit, sensor_height=20, ortho_scale=6)
+                    corner = body.data.view_frame(scene=self.scene)[0]
+                    export.write(self.path)
+                    camera = glb.read(self.path)[0]["cameras"][0]
+                    if kind == "ORTHO":
+                        found, expected = [camera["orthographic"][key] for key in ("xmag", "ymag")], corner[:2]
+                    else:
+                        found, expected = [math.tan(camera["perspective"]["yfov"] / 2)], [corner[1] / -corner[2]]
+                    numpy.testing.assert_allclose(found, expected, rtol=1e-5, err_msg=f"{fit} {width} {kind}")
+                    bpy.data.objects.remove(body)
 
     def test_picture_settings_are_exported(self):
         self.floor()

@@ -267,6 +267,7 @@ class Named(cycles_comparison.CyclesComparison):
         scene.render.engine = "CYCLES"
         self.assertEqual(export.write(self.path), [])
         scene.cycles.max_bounces, scene.cycles.sample_clamp_direct = 2, 3.0
+        scene.cycles.transparent_max_bounces, scene.cycles.caustics_refractive = 1, False
         scene.render.film_transparent = scene.cycles.film_transparent_glass = True
         if bpy.app.version < (5, 0, 0):
             scene.use_nodes = True
@@ -274,7 +275,8 @@ class Named(cycles_comparison.CyclesComparison):
         else:
             tree = scene.compositing_node_group = bpy.data.node_groups.new("compositor", "CompositorNodeTree")
         tree.nodes.new("CompositorNodeBlur")
-        self.named("limits on light paths are not carried (max bounces 2)", "clamping of bright samples",
+        self.named("limits on light paths are not carried (max bounces 2, transparent max bounces 1)",
+                   "switches of caustics are not carried (refractive ones are off)", "clamping of bright samples",
                    "Transparent Glass", "its compositor is not carried")
         scene.render.use_compositing = False
         self.assertNotIn("compositor", "".join(export.write(self.path)))
