@@ -38,6 +38,8 @@ pub struct Fisheye {
 
 /// Smallest sine in densities of panoramas, which are infinite at the poles.
 const MIN_SINE: f32 = 1e-6;
+/// Largest distance of the edge of a panorama from a pole (radians) at which the picture goes on beyond the pole.
+const AT_POLE: f32 = 1e-3;
 
 impl Projection {
     /// Half the size of the film, in the unit of the projection.
@@ -268,12 +270,46 @@ impl Camera {
         // After `subsample` of a window, the corner may be between two pixels.
         let (u, begin) = (u(), corner.floor());
         let film = film - (corner - begin);
-        let [(x, along), (y, across)] = [(film.x, u.x, begin.x), (film.y, u.y, begin.y)].map(|(film, u, begin)| {
-            let (k, sum) = filter::sample_pixel(self.filter, film, u);
-            (k - begin as i64, sum)
-        });
-        let (x, y) = (u32::try_from(x).ok()?, u32::try_from(y).ok()?);
+        let (row, across) = filter::sample_pixel(self.filter, film.y, u.y);
+        let (row, film_x) = self.over_pole(row, film.x);
+        let (column, along) = filter::sample_pixel(self.filter, film_x, u.x);
+        let place = |k: i64, begin: f32| u32::try_from(k - begin as i64).ok();
+        let (x, y) = (place(self.around(column), begin.x)?, place(row, begin.y)?);
         (x < self.width && y < self.height).then_some(((x, y), along * across))
+    }
+
+    /// Number of pixels in a full turn; `None` unless the film is an equirectangular panorama.
+    #[inline]
+    fn turn(&self) -> Option<f32> {
+        let Projection::Equirectangular(half) = self.projection else { return None };
+        Some(self.whole.film.x * PI / half.x)
+    }
+
+    /// The row of a panorama that lies where `row` would continue it beyond a pole, and the point `x` of the film where it
+    /// is crossed; `row` and `x` themselves if there is no pole between.
+    #[inline]
+    fn over_pole(&self, row: i64, x: f32) -> (i64, f32) {
+        let Some(turn) = self.turn() else { return (row, x) };
+        let rows = self.whole.film.y.round() as i64;
+        let is_pole = |latitude: f32| latitude.abs() > 0.5 * PI - AT_POLE;
+        let (top, bottom) = (self.offset.y + self.projection.half().y, self.offset.y - self.projection.half().y);
+        let mirrored = match row {
+            ..0 if is_pole(top) => -1 - row,
+            _ if row >= rows && is_pole(bottom) => 2 * rows - 1 - row,
+            _ => return (row, x),
+        };
+        (mirrored, (x + 0.5 * turn).rem_euclid(turn))
+    }
+
+    /// The column that continues a full panorama at `column`, which may lie beyond its seam.
+    #[inline]
+    fn around(&self, column: i64) -> i64 {
+        let columns = self.whole.film.x;
+        if self.turn().is_some_and(|turn| (turn - columns).abs() < 0.5) {
+            column.rem_euclid(columns.round().max(1.0) as i64)
+        } else {
+            column
+        }
     }
 
     /// Width and height of the whole picture, and column and row of this film's top left corner in it (pixels).
@@ -492,7 +528,9 @@ impl Camera {
         let beyond = (self.filter.radius() - 0.5).max(0.0);
         let seen = |x: f32, from: f32, side: u32| x >= from - beyond && x < from + side as f32 + beyond;
         let corner = self.whole.corner;
-        if !(seen(film.x, corner.x, self.width) && seen(film.y, corner.y, self.height)) {
+        // Filters of a panorama also reach over its seam and its poles.
+        let is_round = beyond > 0.0 && self.turn().is_some();
+        if !is_round && !(seen(film.x, corner.x, self.width) && seen(film.y, corner.y, self.height)) {
             return None;
         }
         Some(CameraSample { film, wi, lens: lens_world, importance })
@@ -567,6 +605,36 @@ mod tests {
                 }
                 let distance2 = if camera.is_orthographic() { 1.0 } else { (p - sample.lens).length_squared() };
                 assert!((sample.importance * distance2 / camera.pdf_w(ray.direction) - 1.0).abs() < 1e-3);
+            }
+        }
+    }
+
+    /// Uniform light on the film of a panorama gives every pixel the same, also where its filter reaches over the seam or
+    /// over a pole, and in a window. The last pictures reach one pole alone, and are odd in width.
+    #[test]
+    fn filters_reach_over_the_seam_and_the_poles() {
+        const POINTS: u64 = 400_000;
+        let panorama = |half: Vec2, middle: f32, size: (u32, u32)| {
+            let projection = Projection::Equirectangular(half);
+            let camera = Camera::new(DVec3::ZERO, Mat3::IDENTITY, projection, (0.0, 1.0), size);
+            camera.with_centre(Vec2::new(0.0, middle)).with_filter(Filter::Gaussian(3.0))
+        };
+        let full = panorama(Vec2::new(PI, 0.5 * PI), 0.0, (16, 8));
+        let north = panorama(Vec2::new(PI, 0.25 * PI), 0.25 * PI, (15, 4));
+        for camera in [full, full.crop([0, 0, 3, 3]), north] {
+            let mut light = vec![0.0; (camera.width * camera.height) as usize];
+            for i in 0..POINTS {
+                let draws = Stream::new(0, 0, Domain::Test, i).vertex(0);
+                let film = draws.two(Purpose::Pixel) * camera.whole.film;
+                if let Some(((x, y), weight)) = camera.sample_pixel(film, || draws.two(Purpose::Splat)) {
+                    light[(y * camera.width + x) as usize] += f64::from(weight);
+                }
+            }
+            let expected = POINTS as f64 / f64::from(camera.whole_pixels());
+            // The southern edge of the last picture is no pole.
+            let rows = if camera.offset.y > 0.0 { 2 } else { camera.height };
+            for (pixel, light) in light[..(rows * camera.width) as usize].iter().enumerate() {
+                assert!((light / expected - 1.0).abs() < 6.0 / expected.sqrt(), "{pixel}: {light} of {expected}");
             }
         }
     }

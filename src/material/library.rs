@@ -116,9 +116,11 @@ impl Material {
         perfect && (glass || self.metallic.factor == 1.0) && !covered
     }
 
-    /// Whether the material makes visible caustics: a mirror or glass with a narrow lobe.
+    /// Whether the material makes visible caustics: a mirror or glass with a narrow lobe. The boundary of smoke, with the
+    /// index of air, bends no light; in water, the water is glass.
     pub fn focuses(&self) -> bool {
-        self.has_narrow_base() && (self.transmission.factor > 0.0 || self.metallic.factor >= 0.5)
+        let bends = self.transmission.factor > 0.0 && self.ior != 1.0;
+        self.has_narrow_base() && (bends || self.metallic.factor >= 0.5)
     }
 
     /// Whether the material fills a solid whose index of refraction depends on the wavelength.

@@ -11,8 +11,10 @@ use serde_json::{Value, json};
 
 /// Largest share of the render's time limit that one run of the denoiser may take at a quality above the lowest.
 const MAX_DENOISING_SHARE: f64 = 0.07;
-/// Width and height of the picture by which the denoiser is timed (pixels).
-const TIMED_SIDE: usize = 192;
+/// Width and height of the picture by which the denoiser is timed, and of the one before, for which it loads its weights
+/// (pixels).
+const TIMED_SIDE: usize = 128;
+const LOADING_SIDE: usize = 16;
 /// Largest share of the render's time limit that the finish (network and denoiser) may take.
 const MAX_FINISH_SHARE: f64 = 0.5;
 
@@ -117,17 +119,16 @@ impl OpenFinish {
     pub fn reserve_time(&mut self, limit: f64, pixels: usize, parts: usize) -> Result<f64> {
         let timing = Clock::start();
         let has_qualities = self.finish.has_qualities();
-        let small = Size { width: TIMED_SIDE, height: TIMED_SIDE };
-        let mut time = |run: &dyn Fn(&mut Finish) -> Result<()>| -> Result<f64> {
-            // The first run also loads the library's weights.
-            run(&mut self.finish)?;
+        let [loading, timed] = [LOADING_SIDE, TIMED_SIDE].map(|side| Size { width: side, height: side });
+        let mut time = |run: &dyn Fn(&mut Finish, Size) -> Result<()>| -> Result<f64> {
+            run(&mut self.finish, loading)?;
             let clock = Clock::start();
-            run(&mut self.finish)?;
-            Ok(clock.seconds() * pixels as f64 / small.pixels() as f64)
+            run(&mut self.finish, timed)?;
+            Ok(clock.seconds() * pixels as f64 / timed.pixels() as f64)
         };
-        let guides = time(&|finish| finish.warm_up_guides(small))?;
-        let network = time(&|finish| finish.warm_up_network(small))?;
-        let mut time = |quality| time(&|finish| finish.warm_up(small, quality));
+        let guides = time(&|finish, size| finish.warm_up_guides(size))?;
+        let network = time(&|finish, size| finish.warm_up_network(size))?;
+        let mut time = |quality| time(&|finish, size| finish.warm_up(size, quality));
         let fast = time(Quality::Fast)?;
         let mut picture = (Quality::Fast, fast);
         if has_qualities {

@@ -202,3 +202,23 @@ fn the_plan_says_that_nothing_merges_in_media() {
     assert_eq!(volume("vcm"), (json!("connections"), json!(["the scene's medium", reason])));
     assert_eq!(volume("sppm"), (json!("photons"), json!(["the scene's medium"])));
 }
+
+/// Glass calls for caustics; the boundary of smoke, which has the index of air, does not.
+#[test]
+fn boundaries_that_bend_no_light_make_no_caustics() {
+    let folder = Folder::new();
+    for (ior, expected) in [(1.5, true), (1.0, false)] {
+        crate::support::glb::write_edited(&folder.path("box.glb"), |document| {
+            let materials = document["materials"].as_array_mut().expect("a list");
+            let silver = materials.iter_mut().find(|material| material["name"] == "silver").expect("it is there");
+            silver["pbrMetallicRoughness"] = json!({"metallicFactor": 0.0, "roughnessFactor": 0.0});
+            silver["extensions"] =
+                json!({"KHR_materials_transmission": {"transmissionFactor": 1.0}, "KHR_materials_ior": {"ior": ior}});
+        });
+        let plan = folder.run("plan box.glb --width 16 --method path --json").json();
+        let effects = plan["effects"].as_array().expect("a list");
+        for effect in effects.iter().filter(|effect| effect["name"] == "caustic" || effect["name"] == "sds") {
+            assert_eq!(effect["present"], expected, "{ior}: {effect}");
+        }
+    }
+}
