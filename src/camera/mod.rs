@@ -530,7 +530,7 @@ impl Camera {
         let corner = self.whole.corner;
         // Filters of a panorama also reach over its seam and its poles.
         let is_round = beyond > 0.0 && self.turn().is_some();
-        if !is_round && !(seen(film.x, corner.x, self.width) && seen(film.y, corner.y, self.height)) {
+        if !(is_round || seen(film.x, corner.x, self.width) && seen(film.y, corner.y, self.height)) {
             return None;
         }
         Some(CameraSample { film, wi, lens: lens_world, importance })

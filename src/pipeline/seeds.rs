@@ -136,11 +136,11 @@ impl Seeds {
                 return Err(error(cause).hint("merge renders that differ in their --seed alone"));
             }
         }
-        if let Some((sum, _)) = &self.sum {
-            if (sum.width, sum.height) != (set.width, set.height) {
-                let cause = format!("is {} x {}, the others {} x {}", set.width, set.height, sum.width, sum.height);
-                return Err(error(cause).hint("merge renders of one picture"));
-            }
+        if let Some((sum, _)) = &self.sum
+            && (sum.width, sum.height) != (set.width, set.height)
+        {
+            let cause = format!("is {} x {}, the others {} x {}", set.width, set.height, sum.width, sum.height);
+            return Err(error(cause).hint("merge renders of one picture"));
         }
         let seeds = match header["merged"]["seeds"].as_array() {
             Some(seeds) => seeds.iter().map(Value::as_u64).collect(),
