@@ -7,7 +7,7 @@
 use super::{Cdf, EmissionSample, EntryDisc, Region, Sky};
 use crate::geometry::Shapes;
 use crate::material::Objects;
-use crate::math::{Frame, Vec2, Vec3, bounding_box, warp};
+use crate::math::{Frame, Rgb, Vec2, Vec3, bounding_box, warp};
 use std::f32::consts::PI;
 
 /// Share of the light paths from infinity that start on the disc of a caustic target, an object that can make caustics.
@@ -147,8 +147,13 @@ impl CausticTargets {
     /// Finds the caustic targets, where `sphere` gives the bounding sphere of an instance.
     fn find(objects: Objects<'_>, sphere: impl Fn(usize) -> Option<(Vec3, f32)>) -> CausticTargets {
         let all = &objects.shapes.instances;
-        let focuses = |i: &usize| objects.material(&all[*i]).focuses();
-        let instances: Vec<_> = (0..all.len()).map(|i| Some(i).filter(focuses).and_then(&sphere)).collect();
+        // Few light paths would find a small body that scatters light, either.
+        let is_target = |i: &usize| {
+            let material = objects.material(&all[*i]);
+            let scatters = || material.medium.is_some_and(|medium| medium.sigma_s != Rgb::ZERO);
+            material.focuses() || (material.is_solid() && scatters())
+        };
+        let instances: Vec<_> = (0..all.len()).map(|i| Some(i).filter(is_target).and_then(&sphere)).collect();
         let spheres: Vec<(Vec3, f32)> = instances.iter().copied().flatten().collect();
         let spheres = merged_spheres(spatially_merged(spheres, MAX_SPHERES), MAX_TARGETS);
         let areas = spheres.iter().map(|s| PI * s.1 * s.1);
@@ -273,7 +278,6 @@ impl CausticTargets {
 mod tests {
     use super::*;
     use crate::light::EmissionDensity;
-    use crate::math::Rgb;
     use crate::random::{Domain, Purpose, Stream};
 
     /// Test start of a light path from infinity, sampled on the scene's disc of area `whole` (m2) without aiming.
