@@ -6,7 +6,7 @@ use crate::files;
 use crate::math::DAffine3;
 use crate::scene::Description;
 use crate::stop::Stop;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// An edit of a scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,6 +17,14 @@ pub enum Edit {
     Remove(String),
     /// Adds the objects and lights of a scene file, in place of those that have the same names.
     Replace(PathBuf),
+}
+
+/// Checks that a scene file is a regular file: who waits for the answer to a command must not wait for a pipe.
+///
+/// # Errors
+/// It cannot be opened, or is a pipe or a device.
+pub fn check_file(path: &Path) -> Result<()> {
+    files::open(path).map(drop).map_err(|cause| Error::io(path, &cause).hint("name a scene file"))
 }
 
 /// A scene that has been loaded and can be edited.
@@ -75,8 +83,7 @@ impl EditableScene {
                 Edit::Place(name, to_world) => description.place(name, *to_world)?,
                 Edit::Remove(name) => description.remove(name)?,
                 Edit::Replace(path) => {
-                    // Who waits for the answer must not wait for a pipe.
-                    files::open(path).map_err(|cause| Error::io(path, &cause).hint("name a scene file"))?;
+                    check_file(path)?;
                     let (mut part, _) = load::read_file(path, &self.request.options, stop)?;
                     warnings.append(&mut part.warnings);
                     description.replace_by(part);

@@ -131,18 +131,18 @@ fn place_of_image(
     // By how much the last ray from a film point misses the target, in the plane across the one from `film`, and the change
     // of that per pixel.
     let mut missed = |film: Vec2| {
-        let along = ray(film)?.direction;
-        let (right, up) = along.any_orthonormal_pair();
-        let mut at = |film: Vec2| {
-            let PointOnRay { p, direction } = ray(film)?;
-            let apart = p - target - direction * ((p - target).dot(along) / direction.dot(along));
-            Some(Vec2::new(apart.dot(right), apart.dot(up)))
+        let middle = ray(film)?;
+        let (right, up) = middle.direction.any_orthonormal_pair();
+        let offset = |PointOnRay { p, direction }: PointOnRay| {
+            let along = (p - target).dot(middle.direction) / direction.dot(middle.direction);
+            let apart = p - target - direction * along;
+            Vec2::new(apart.dot(right), apart.dot(up))
         };
-        let here = at(film)?;
+        let here = offset(middle);
         let mut slope = |axis: Vec2| {
             // At an edge, one of the neighbours is missing.
-            let (step, beside) = [STEP, -STEP].into_iter().find_map(|step| Some((step, at(film + step * axis)?)))?;
-            Some((beside - here) / step)
+            let (step, beside) = [STEP, -STEP].into_iter().find_map(|step| Some((step, ray(film + step * axis)?)))?;
+            Some((offset(beside) - here) / step)
         };
         Some((here, Mat2::from_cols(slope(Vec2::X)?, slope(Vec2::Y)?)))
     };

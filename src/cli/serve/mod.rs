@@ -8,10 +8,9 @@ use super::render::{self, RenderArgs};
 use super::{parse_render, signals};
 use caustique::argument::threads;
 use caustique::error::{Error, ErrorKind, Result};
-use caustique::files;
 use caustique::film::{LayerSet, Plane};
 use caustique::options::{FinishOptions, SceneOptions};
-use caustique::pipeline::edit::{Edit, EditableScene};
+use caustique::pipeline::edit::{Edit, EditableScene, check_file};
 use caustique::pipeline::finish;
 use caustique::pipeline::live::{LiveEnd, LiveRequest, Shown, render_live};
 use caustique::pipeline::{OpenFinish, PictureRequest};
@@ -97,8 +96,7 @@ impl Server {
             None => options.clone(),
             Some(frames) => options.at(frames.single().ok_or_else(|| one_frame(options))?),
         };
-        // The program that waits for the answer must not wait for a pipe.
-        files::open(&options.path).map_err(|cause| Error::io(&options.path, &cause).hint("name a scene file"))?;
+        check_file(&options.path)?;
         let mut request = options.request();
         // A later command may ask for motion vectors.
         request.options.motion_vectors = true;
