@@ -52,6 +52,8 @@ def switch_nodes_off(light):
         light.use_nodes = False
         return
     tree = light.node_tree  # Blender 5 ignores the switch
+    if tree is None:
+        return
     tree.nodes.clear()
     shader = tree.nodes.new("ShaderNodeEmission")
     tree.links.new(shader.outputs[0], tree.nodes.new("ShaderNodeOutputLight").inputs["Surface"])

@@ -365,8 +365,8 @@ pub static LAYERS: &[LayerKind] = &[
         ..LayerKind::first(
             MOTION,
             "XYZW",
-            "motion at the first hit that is not a perfect mirror or clear glass: place in the previous frame less that in \
-             this one, and place in this frame less that in the next, y up; only if asked for by name",
+            "motion of what the pixel shows, in resting mirrors and clear glass that of the image: place in the previous frame \
+             less that in this one, and place in this frame less that in the next, y up; only if asked for by name",
         )
     },
     LayerKind {
