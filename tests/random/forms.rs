@@ -115,7 +115,7 @@ fn over_a_floor(random: &mut Random) -> (World, DVec3) {
     let side = if random.chance(0.5) { 1.0 } else { -1.0 };
     let eye = DVec3::new(0.9 * side, random.within(-0.6, -0.2), 0.9);
     let target = DVec3::new(random.within(0.35, 0.6) * side, -1.0, random.within(0.1, 0.6));
-    let lens = Lens { view: random.within(0.1, 0.3), orthographic: false, aperture: 0.0, focus: 1.0 };
+    let lens = Lens { view: random.within(0.1, 0.3), focus: 1.0, ..Lens::default() };
     world.look(eye, target, lens);
     let base = random.vector(0.2, 0.9);
     let floor = quad(DVec3::new(-1.0, -1.0, -1.0), DVec3::Z * 2.0, DVec3::X * 2.0);
@@ -337,7 +337,7 @@ fn lit_patches(mesh: &Mesh, to_world: &DAffine3, p: DVec3, axis: DVec3, cone: (f
 /// An emissive wall, and a camera that sees only the wall.
 fn before_a_wall(random: &mut Random, view: f64) -> (World, DVec3) {
     let mut world = World { size: 4.0, ..World::default() };
-    world.look(DVec3::Z * 2.0, DVec3::ZERO, Lens { view, orthographic: false, aperture: 0.0, focus: 2.0 });
+    world.look(DVec3::Z * 2.0, DVec3::ZERO, Lens { view, focus: 2.0, ..Lens::default() });
     let emission = random.vector(0.2, 3.0);
     let wall = quad(DVec3::new(-2.0, -2.0, -1.0), DVec3::X * 4.0, DVec3::Y * 4.0);
     world.add("wall", wall, Matter::glowing(emission), vec![Placement::IDENTITY]);
@@ -462,11 +462,7 @@ fn hidden(random: &mut Random) -> Known {
 
 fn furnace(random: &mut Random) -> Known {
     let mut world = World { size: 2.0, sky: Some(DVec3::ONE), ..World::default() };
-    world.look(
-        DVec3::new(0.0, 0.3, 3.0),
-        DVec3::ZERO,
-        Lens { view: 0.6, orthographic: false, aperture: 0.0, focus: 3.0 },
-    );
+    world.look(DVec3::new(0.0, 0.3, 3.0), DVec3::ZERO, Lens { view: 0.6, focus: 3.0, ..Lens::default() });
     for _ in 0..1 + random.below(3) {
         let mesh = match random.below(4) {
             0 => sphere(12 + 2 * random.below(8) as u32, false),

@@ -6,7 +6,9 @@
 use super::random::Random;
 use super::relation::similar;
 use super::shapes::{cuboid, disc, joined, lathe, prism, quad, sphere, triangle, vessel};
-use super::world::{Lens, Light, LightKind, Matter, Medium, Mesh, Placement, Texture, Thing, ThingKind, World};
+use super::world::{
+    Lens, Light, LightKind, Matter, Medium, Mesh, Panorama, PixelFilter, Placement, Texture, Thing, ThingKind, World,
+};
 use glam::{DQuat, DVec2, DVec3, EulerRot};
 use std::f64::consts::{PI, TAU};
 
@@ -22,6 +24,8 @@ const FIRST_WITH_WINDOWS: u64 = 4000;
 const FIRST_WITH_SHADOW_LINKS: u64 = 5000;
 /// First seed of scenes with lamps outside of the room.
 const FIRST_WITH_OUTER_LAMPS: u64 = 6000;
+/// First seed of scenes with panoramas and pixel filters.
+pub const FIRST_WITH_PANORAMAS: u64 = 7000;
 /// Number of attempts to find a place for a thing.
 const ATTEMPTS: usize = 40;
 
@@ -64,6 +68,10 @@ pub fn generate(seed: u64) -> World {
         }
         if seed >= FIRST_WITH_OUTER_LAMPS && generator.closed && generator.random.chance(0.5) {
             generator.outer_lamps();
+        }
+        if seed >= FIRST_WITH_PANORAMAS {
+            generator.panoramas();
+            generator.filter();
         }
         generator.random = own;
     }
@@ -122,7 +130,8 @@ impl Generator {
             let orthographic = self.random.chance(0.08);
             let view = if orthographic { self.random.within(0.15, 0.3) } else { self.random.within(0.6, 1.3) };
             let aperture = if self.random.chance(0.15) { self.random.within(0.002, 0.01) } else { 0.0 };
-            self.world.look(eye, target, Lens { view, orthographic, aperture, focus: eye.distance(target) });
+            let focus = eye.distance(target);
+            self.world.look(eye, target, Lens { view, orthographic, aperture, focus, panorama: None });
             self.taken.push((eye, CAMERA_SPACE));
         }
     }
@@ -556,6 +565,37 @@ impl Generator {
             let place = Placement { scale: DVec3::splat(radius), ..Placement::at(half * (DVec3::Y + at)) };
             self.world.add("lamp behind a wall", sphere(16, true), Matter::glowing(emission), vec![place]);
         }
+    }
+
+    /// Makes panoramas of some cameras.
+    fn panoramas(&mut self) {
+        for thing in &mut self.world.things {
+            let ThingKind::Camera(lens) = &mut thing.kind else { continue };
+            let random = &mut self.random;
+            let panorama = match random.below(6) {
+                0 | 1 => Panorama::WHOLE,
+                2 => {
+                    let (left, low) = (random.within(-180.0, 60.0), random.within(-90.0, 30.0));
+                    Panorama::Equirectangular {
+                        longitude: [left, left + random.within(60.0, 360.0)],
+                        latitude: [low, random.within(low + 30.0, 90.0)],
+                    }
+                }
+                3 => Panorama::Fisheye { fov: random.within(60.0, 360.0), equisolid: random.chance(0.5) },
+                _ => continue,
+            };
+            *lens = Lens { view: 1.0, focus: lens.focus, panorama: Some(panorama), ..Lens::default() };
+        }
+    }
+
+    fn filter(&mut self) {
+        let width = self.random.within(0.5, 8.0) as f32;
+        self.world.filter = match self.random.below(6) {
+            0 => PixelFilter::Box(width),
+            1 => PixelFilter::Gaussian(width),
+            2 => PixelFilter::BlackmanHarris(width),
+            _ => PixelFilter::Pixel,
+        };
     }
 
     /// Adds a solid that overlaps a floating one.

@@ -32,6 +32,7 @@ use picture::{SEEDS, Shot, differences, pictures, read};
 use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
 use relation::{Relation, check};
 use std::ops::Range;
+use world::PixelFilter;
 
 /// Seeds of the scenes whose relations are checked.
 const SCENES: Range<u64> = 0..12;
@@ -78,11 +79,24 @@ fn relations_hold_beside_lamps_behind_walls() {
             return false;
         }
         let scene = read(&world).expect("the scene is read");
-        let camera = scene.camera(&Shot::new(Method::Path, world.cameras()[0]).view()).expect("a camera");
+        let camera = scene.camera(&Shot::new(Method::Path, world.cameras()[0]).view(&world)).expect("a camera");
         learn_light(View::new(&scene, &camera), &Settings::default()).lights.is_some()
     };
     let rooms: Vec<u64> = (6000..6060).filter(learns).take(1).collect();
     assert_eq!(rooms.len(), 1, "{rooms:?}");
+    check_relations(rooms);
+}
+
+/// Pictures of all directions, with pixel filters that reach over their edges.
+#[test]
+fn relations_hold_in_panoramas() {
+    let is_chosen = |seed: &u64| {
+        let world = generate(*seed);
+        let shot = Shot::new(Method::Path, world.cameras()[*seed as usize % world.cameras().len()]);
+        world.filter != PixelFilter::Pixel && Relation::Panned.other(&world, &shot).is_some()
+    };
+    let rooms: Vec<u64> = (generate::FIRST_WITH_PANORAMAS..7100).filter(is_chosen).take(2).collect();
+    assert_eq!(rooms.len(), 2, "{rooms:?}");
     check_relations(rooms);
 }
 

@@ -1,10 +1,10 @@
 //! Pictures of several seeds, and the test whether two sets of them differ.
 
 use super::usd;
-use super::world::World;
+use super::world::{PixelFilter, World};
 use super::write::glb;
 use crate::support::stats::mean_and_error;
-use caustique::camera::Camera;
+use caustique::camera::{Camera, Filter};
 use caustique::material::{Material, MediumGrids};
 use caustique::math::Vec3;
 use caustique::medium::{DensityGrid, EmissionGrid, Grid};
@@ -86,13 +86,20 @@ impl Shot {
         }
     }
 
-    pub fn view(&self) -> CameraRequest {
+    pub fn view(&self, world: &World) -> CameraRequest {
         let tile = SIZE / TILES;
+        let filter = match world.filter {
+            PixelFilter::Pixel => Filter::default(),
+            PixelFilter::Box(width) => Filter::Box(width),
+            PixelFilter::Gaussian(width) => Filter::Gaussian(width),
+            PixelFilter::BlackmanHarris(width) => Filter::BlackmanHarris(width),
+        };
         CameraRequest {
             camera: Some(if self.usd { usd::camera(&self.camera) } else { self.camera.clone() }),
             width: Some(SIZE),
             height: Some(SIZE),
             crop: self.window.map(|window| Crop::Pixels(window.map(|side| side * tile))),
+            filter,
             ..CameraRequest::default()
         }
     }
@@ -140,7 +147,7 @@ pub fn renders(world: &World, shot: &Shot, seeds: std::ops::Range<u64>) -> Resul
         return later(world, shot, seeds);
     }
     let scene = if shot.usd { build(usd::read(world)?)? } else { read(world)? };
-    let camera = scene.camera(&shot.view()).map_err(|error| error.to_string())?;
+    let camera = scene.camera(&shot.view(world)).map_err(|error| error.to_string())?;
     seeds.map(|seed| accepted(render(&scene, &camera, &shot.settings(seed), |_, _| Control::Continue))).collect()
 }
 
@@ -178,11 +185,11 @@ fn later(world: &World, shot: &Shot, seeds: std::ops::Range<u64>) -> Result<Vec<
     let (mut description, file) = read.map_err(text)?;
     light_preset::apply(&mut description, None);
     let scene = build(description)?;
-    let camera = scene.camera(&shot.view()).map_err(text)?;
+    let camera = scene.camera(&shot.view(world)).map_err(text)?;
     let moving = match (&file, scene.shutter) {
         (Some(file), Some(shutter)) => {
             let (moments, builder) = (file.moments().map_err(text)?, MomentBuilder::new(&scene));
-            Some(Moving { moments, builder, shutter, view: shot.view() })
+            Some(Moving { moments, builder, shutter, view: shot.view(world) })
         }
         _ => None,
     };
@@ -245,7 +252,7 @@ pub fn finds_all(world: &World, scene: &Scene, shot: &Shot) -> bool {
         matches!(shot.method, Method::Path | Method::Bdpt) || (shot.method == Method::Vcm && scene.survey.scattering);
     let by_chance = without_photons && world.smallest_light() < SMALL_LIGHT;
     let found = |e: &EffectPlan| !e.present || (e.simulated && !(by_chance && e.effect == Effect::Sds));
-    scene.camera(&shot.view()).is_ok_and(|camera| Plan::new(scene, &camera, &asked).effects.iter().all(found))
+    scene.camera(&shot.view(world)).is_ok_and(|camera| Plan::new(scene, &camera, &asked).effects.iter().all(found))
 }
 
 /// A mean in which two sets differ.

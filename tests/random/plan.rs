@@ -12,7 +12,7 @@ pub const OTHERS: [Method; 7] =
     [Method::Light, Method::Mlt, Method::Appm, Method::Cppm, Method::Ppm, Method::Bpm, Method::Pm];
 
 /// `count` checks of the scene of a seed with the four methods, in an order that covers all pairs of relation and
-/// method; one check with another method; and one comparison of two methods. With shadow linking, path tracing alone.
+/// method; one check with another method; one of a turned panorama, and one comparison of two methods. With shadow linking, path tracing alone.
 pub fn checks(world: &World, count: usize) -> Vec<(Relation, Shot)> {
     let i = world.seed as usize;
     let cameras = world.cameras();
@@ -22,6 +22,8 @@ pub fn checks(world: &World, count: usize) -> Vec<(Relation, Shot)> {
     let mut list: Vec<(Relation, Shot)> =
         (0..count).map(|k| (RELATIONS[(i + 5 * k) % n], shot(METHODS[(i + k + i / n) % METHODS.len()]))).collect();
     list.push((RELATIONS[(3 * i + 1) % n], shot(OTHERS[i % OTHERS.len()])));
+    // It applies to panoramas alone.
+    list.push((Relation::Panned, shot(METHODS[i % METHODS.len()])));
     if !shadow_links {
         list.extend(methods(world, i).map(|(a, b)| (Relation::Method(b), shot(a))));
     }

@@ -2,7 +2,7 @@
 
 use super::forms::{Form, Known};
 use super::relation::{Other, Relation, lifted, switch_off};
-use super::world::{Medium, Mesh, Thing, ThingKind, World};
+use super::world::{Medium, Mesh, PixelFilter, Thing, ThingKind, World};
 use glam::DVec3;
 
 /// A planted bug in one of the two sides of a relation.
@@ -95,6 +95,16 @@ fn widen(_: &mut World, other: &mut Other) -> bool {
     true
 }
 
+fn forget_the_filter(world: &mut World, other: &mut Other) -> bool {
+    other.worlds[0].filter = PixelFilter::Pixel;
+    world.filter != PixelFilter::Pixel
+}
+
+fn keep_the_camera(world: &mut World, other: &mut Other) -> bool {
+    other.worlds[0] = world.clone();
+    true
+}
+
 fn keep_intensity(world: &mut World, other: &mut Other) -> bool {
     let mut any = false;
     for (thing, before) in other.worlds[0].things.iter_mut().zip(&world.things) {
@@ -148,6 +158,8 @@ pub fn plants() -> Vec<Plant> {
         plant("the frame is shown", Relation::Later, 0, turn_lights_off),
         plant("solids around the camera are seen", Relation::Void, 0, fill_voids),
         plant("the window shows more", Relation::Cropped, 0, widen),
+        plant("the window has no filter", Relation::Cropped, 7047, forget_the_filter),
+        plant("the camera stays", Relation::Panned, 7032, keep_the_camera),
         plant("lamps are a tenth too bright", Relation::Usd, 0, brighten),
         plant("a mirror is forgotten", Relation::MirroredTwice, 0, forget_a_mirror),
     ]

@@ -1,12 +1,15 @@
 //! Relations that must hold for any scene, and planted bugs that must violate them.
 
-use super::picture::{Difference, Found, MEANS, SIGNIFICANCE, Set, Shot, TOLERANCE, confirmed, differences, pictures};
+use super::picture::{
+    Difference, Found, MEANS, SIGNIFICANCE, Set, Shot, TILES, TOLERANCE, confirmed, differences, pictures,
+};
 use super::random::Random;
 use super::shapes::cuboid;
-use super::world::{Later, Light, LightKind, Matter, Mesh, Placement, ThingKind, World};
+use super::world::{Later, Lens, Light, LightKind, Matter, Mesh, Panorama, Placement, ThingKind, World};
 use caustique::render::Method;
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
 
 /// A relation between the picture of a scene and the picture of a changed scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -35,6 +38,8 @@ pub enum Relation {
     Lifted,
     /// A crop window of the picture.
     Cropped,
+    /// The camera of a panorama of all directions is turned by a tile about its vertical axis.
+    Panned,
     /// Every mesh is mirrored in the file and mirrored back by its node.
     MirroredTwice,
     /// A small black object is added far away.
@@ -78,6 +83,8 @@ pub struct Other {
     pub factor: f64,
     /// The channel of these pictures that is compared with each channel of the scene's pictures.
     pub channels: [usize; 3],
+    /// Number of tiles by which these pictures are shifted to the right, around the picture.
+    pub roll: usize,
     pub tolerance: f64,
 }
 
@@ -91,6 +98,7 @@ impl Relation {
             shot: shot.clone(),
             factor: 1.0,
             channels: identity,
+            roll: 0,
             tolerance: TOLERANCE,
         };
         Some(match self {
@@ -114,6 +122,7 @@ impl Relation {
             Relation::Cropped => {
                 Other { shot: Shot { window: Some([1, 1, 2, 3]), ..shot.clone() }, ..one(world.clone()) }
             }
+            Relation::Panned => Other { roll: 1, ..one(panned(world, &shot.camera)?) },
             Relation::MirroredTwice => one(mirrored(world)),
             Relation::FarThing => one(with_far_thing(world)?),
             Relation::Later => {
@@ -218,7 +227,10 @@ fn others(other: &Other, shot: &Shot, seeds: std::ops::Range<u64>) -> Result<Set
         let set = pictures(world, shot, first + seeds.start..first + seeds.end)?;
         for (total, means) in sum.iter_mut().zip(&set) {
             for (at, total) in total.iter_mut().enumerate() {
-                *total += means[at - at % 3 + other.channels[at % 3]] / other.factor;
+                let (tile, width) = (at / 3, TILES as usize);
+                let from =
+                    if tile < width * width { tile - tile % width + (tile % width + other.roll) % width } else { tile };
+                *total += means[3 * from + other.channels[at % 3]] / other.factor;
             }
         }
     }
@@ -450,6 +462,15 @@ pub fn lifted(world: &World, share: f64) -> Option<World> {
         thing.chain.push(Placement::at(DVec3::Y * share * 2.0 * radius / up.length()));
     }
     made.things.iter().any(|thing| thing.rests).then_some(made)
+}
+
+/// Turns a panorama of all directions by a tile to the left. `None` for other cameras.
+fn panned(world: &World, camera: &str) -> Option<World> {
+    let mut made = world.clone();
+    let thing = made.things.iter_mut().find(|thing| thing.name == camera)?;
+    let whole = matches!(thing.kind, ThingKind::Camera(Lens { panorama: Some(Panorama::WHOLE), .. }));
+    thing.chain.push(Placement::turned(DQuat::from_rotation_y(TAU / f64::from(TILES))));
+    whole.then_some(made)
 }
 
 /// Mirrors every mesh, and mirrors it back by its node.

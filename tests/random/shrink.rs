@@ -1,6 +1,6 @@
 //! Reduces a failing scene as far as possible while it still fails.
 
-use super::world::{LightKind, Matter, Placement, ThingKind, World};
+use super::world::{Lens, LightKind, Matter, PixelFilter, Placement, ThingKind, World};
 use glam::DVec3;
 
 /// Returns the smallest scene found for which `fails` is true, by removing and simplifying one thing after another.
@@ -45,6 +45,7 @@ fn without_space(world: &World, index: usize) -> Candidate {
     Some(match index {
         0 => world.sky.map(|_| World { sky: None, ..world.clone() }),
         1 => world.fog.map(|_| World { fog: None, ..world.clone() }),
+        2 => (world.filter != PixelFilter::Pixel).then(|| World { filter: PixelFilter::Pixel, ..world.clone() }),
         _ => return None,
     })
 }
@@ -68,7 +69,7 @@ fn with_plain_matter(world: &World, index: usize) -> Candidate {
     }))
 }
 
-/// Lights and cameras of size zero.
+/// Lights and cameras of size zero, without panoramas.
 fn with_plain_light(world: &World, index: usize) -> Candidate {
     let thing = world.things.get(index)?;
     let mut kind = thing.kind;
@@ -77,7 +78,10 @@ fn with_plain_light(world: &World, index: usize) -> Candidate {
             let plain = LightKind::Point { radius: 0.0 };
             std::mem::replace(&mut light.kind, plain) != plain
         }
-        ThingKind::Camera(lens) => std::mem::replace(&mut lens.aperture, 0.0) != 0.0,
+        ThingKind::Camera(lens) => {
+            let plain = Lens { aperture: 0.0, panorama: None, ..*lens };
+            std::mem::replace(lens, plain) != plain
+        }
         ThingKind::Mesh { .. } => false,
     };
     Some(changed.then(|| {

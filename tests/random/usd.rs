@@ -6,7 +6,7 @@ use caustique::scene::gltf::ReadOptions;
 use caustique::stop::Stop;
 use glam::DVec3;
 
-/// The part of a scene that USD can express: no media, textures, lenses, soft spots and spots with a radius, and no
+/// The part of a scene that USD can express: no media, textures, lenses, panoramas, soft spots and spots with a radius, and no
 /// partial specular reflection.
 pub fn reduced(world: &World) -> World {
     let mut made = World { fog: None, textures: vec![], ..world.clone() };
@@ -31,7 +31,7 @@ pub fn reduced(world: &World) -> World {
         thing.unblocked.clear();
         match &mut thing.kind {
             ThingKind::Mesh { .. } => continue,
-            ThingKind::Camera(lens) => lens.aperture = 0.0,
+            ThingKind::Camera(lens) => (lens.aperture, lens.panorama) = (0.0, None),
             ThingKind::Light(Light { kind: LightKind::Spot { inner, outer, radius }, .. }) => {
                 (*inner, *radius) = (*outer, 0.0);
             }

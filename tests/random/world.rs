@@ -25,6 +25,20 @@ pub struct World {
     /// Whether the scene appears after the frame.
     #[serde(default)]
     pub later: Option<Later>,
+    /// Filter of the pixels.
+    #[serde(default)]
+    pub filter: PixelFilter,
+}
+
+/// Filter of the pixels, with its width (pixels).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub enum PixelFilter {
+    /// The pixel itself.
+    #[default]
+    Pixel,
+    Box(f32),
+    Gaussian(f32),
+    BlackmanHarris(f32),
 }
 
 /// A scene that appears after its frame 0: lights are dark at the frame and things have other sizes. Frames last a
@@ -105,13 +119,28 @@ pub enum LightKind {
 }
 
 /// A camera with a square film that looks along -Z of its node.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Lens {
     /// Field of view (radians), or half the width of an orthographic picture (m).
     pub view: f64,
     pub orthographic: bool,
     pub aperture: f64,
     pub focus: f64,
+    /// The directions that the picture shows instead, if it is a panorama.
+    #[serde(default)]
+    pub panorama: Option<Panorama>,
+}
+
+/// A panorama. Angles are in degrees.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Panorama {
+    Equirectangular { longitude: [f64; 2], latitude: [f64; 2] },
+    Fisheye { fov: f64, equisolid: bool },
+}
+
+impl Panorama {
+    /// All directions.
+    pub const WHOLE: Panorama = Panorama::Equirectangular { longitude: [-180.0, 180.0], latitude: [-90.0, 90.0] };
 }
 
 /// A triangle mesh.

@@ -1,7 +1,7 @@
 //! Writes scenes as the bytes of a .glb file.
 
 use super::random::Random;
-use super::world::{Later, Lens, Light, LightKind, Matter, Medium, Mesh, Texture, Thing, ThingKind, World};
+use super::world::{Later, Lens, Light, LightKind, Matter, Medium, Mesh, Panorama, Texture, Thing, ThingKind, World};
 use glam::DVec3;
 use image::{ImageFormat, RgbImage};
 use serde_json::{Value, json};
@@ -233,6 +233,16 @@ impl Writer {
         if lens.aperture > 0.0 {
             let extras = json!({"aperture_radius": lens.aperture, "focus_distance": lens.focus});
             node["extras"] = json!({"caustique": extras});
+        }
+        if let Some(panorama) = lens.panorama {
+            node["extras"] = json!({"caustique": {"panorama": match panorama {
+                Panorama::Equirectangular { longitude, latitude } => {
+                    json!({"longitude_deg": longitude, "latitude_deg": latitude})
+                }
+                Panorama::Fisheye { fov, equisolid } => {
+                    json!({"fisheye": if equisolid { "equisolid" } else { "equidistant" }, "fov_deg": fov})
+                }
+            }}});
         }
     }
 
