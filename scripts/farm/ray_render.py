@@ -216,7 +216,7 @@ def parse_request(words):
     parser.add_argument("--partial", type=float, default=60, help="seconds between pictures so far, 0 for none (60)")
     parser.add_argument("--address", help="address of the cluster for ray.init; default: this machine")
     known, render = parser.parse_known_args(mine)
-    for option in render:
+    for option in (word.partition("=")[0] for word in render):
         if option in RESERVED:
             parser.error(f"{option} is given by the farm")
         if option in MERGE_OPTIONS:

@@ -23,6 +23,11 @@ set -euo pipefail
 farm=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 scene='' out='' shards='' frames='' cores=1 retries=3 wait='' dry='' render=() merge=()
 while [ $# -gt 0 ]; do
+    # Also --option=value.
+    case ${1%%=*} in
+    --shard | --resume | --checkpoint | --threads) fail "$1 is given by the farm" 'see the head of this script' ;;
+    --png | --exposure | --tonemap | --contrast | --preview | --layers) fail "$1: no shard is a picture" "give what the merge is to do behind --" ;;
+    esac
     case $1 in
     -o | --output) out=${2:-} && shift ;;
     --shards) shards=${2:-} && shift ;;
@@ -32,8 +37,6 @@ while [ $# -gt 0 ]; do
     --wait) wait=1 ;;
     --dry-run) dry=1 ;;
     --) merge=("${@:2}") && break ;;
-    --shard | --resume | --checkpoint | --threads) fail "$1 is given by the farm" 'see the head of this script' ;;
-    --png | --exposure | --tonemap | --contrast | --preview | --layers) fail "$1: no shard is a picture" "give what the merge is to do behind --" ;;
     *) if [ -z "$scene" ] && [[ $1 != -* ]]; then scene=$1; else render+=("$1"); fi ;;
     esac
     shift
@@ -49,6 +52,7 @@ if [ -n "$frames" ]; then
     [[ $out == *\#* ]] || fail "$out: all frames have the same name" "put '####' where the frame's number belongs"
     step=${frames#*,} range=${frames%,*}
     [ "$step" != "$frames" ] || step=1
+    [ "${range%-*}" -le "${range#*-}" ] || fail "--frames: '$frames' ends before it begins" 'give A-B, such as 1-100'
     mapfile -t numbers < <(seq "${range%-*}" "$step" "${range#*-}")
 else
     numbers=('')

@@ -5,7 +5,7 @@
 //! another process takes the frame. Ages are differences of times of the file server, because the clocks of machines
 //! differ.
 
-use caustique::error::{Error, Result};
+use caustique::error::Result;
 use caustique::files;
 use caustique::image::atomic;
 use caustique::system::{self, machine};
@@ -53,16 +53,21 @@ impl Claim {
     /// The folder is not writable.
     pub fn claim(output: &Path) -> Result<Claimed> {
         atomic::check_writable(output)?;
-        Claim::make(file(output), owner()).map_err(|cause| Error::io(output, &cause))
+        Claim::make(file(output), owner()).map_err(|cause| atomic::failure(output, &cause))
     }
 
     fn make(path: PathBuf, owner: String) -> io::Result<Claimed> {
         loop {
             match File::options().read(true).write(true).create_new(true).open(&path) {
                 Ok(mut file) => {
-                    file.write_all(owner.as_bytes())?;
-                    file.sync_all()?;
-                    return Ok(Claimed::Here(Claim::keep(path, owner, file)));
+                    return match file.write_all(owner.as_bytes()).and_then(|()| file.sync_all()) {
+                        Ok(()) => Ok(Claimed::Here(Claim::keep(path, owner, file))),
+                        Err(cause) => {
+                            // Where the disk is full, a claim without an owner would keep others from the frame.
+                            let _ = fs::remove_file(&path);
+                            Err(cause)
+                        }
+                    };
                 }
                 Err(cause) if cause.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(cause) => return Err(cause),

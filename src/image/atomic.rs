@@ -113,7 +113,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
 }
 
 /// An error of the file system while writing `path`, with a remedy if there is one.
-pub(crate) fn failure(path: &Path, cause: &io::Error) -> Error {
+pub fn failure(path: &Path, cause: &io::Error) -> Error {
     let error = Error::io(path, cause);
     match cause.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge => {

@@ -176,8 +176,9 @@ impl Material {
     /// Whether textures change the tint that the clear coat gives to the emission below it, which the emission itself
     /// does not include then.
     pub fn has_textured_tint(&self) -> bool {
-        let by_path = self.clearcoat_ior.texture.is_some() && self.clearcoat_color.factor != Rgb::ONE;
-        self.clearcoat.factor > 0.0 && (self.clearcoat_color.texture.is_some() || by_path)
+        let textured = self.clearcoat.texture.is_some() || self.clearcoat_ior.texture.is_some();
+        let by_share = textured && self.clearcoat_color.factor != Rgb::ONE;
+        self.clearcoat.factor > 0.0 && (self.clearcoat_color.texture.is_some() || by_share)
     }
 
     /// Whether the radiance that surfaces emit varies with textures.

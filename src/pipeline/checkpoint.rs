@@ -64,6 +64,12 @@ pub fn write(path: &Path, head: &Head, state: State<&[PixelAccumulator]>) -> Res
     })
 }
 
+/// Whether the file at `path` is there and a new render must not replace it by its own checkpoint, because it is the
+/// checkpoint of a render that was not finished, or none.
+pub fn is_unfinished(path: &Path) -> bool {
+    path.is_file() && check_replaceable(path, false, "").is_err()
+}
+
 /// Checks that a new render may replace the file at `path` by its own checkpoint. `remedy`: how to continue the render of
 /// the existing checkpoint, or to overwrite it.
 ///

@@ -179,13 +179,23 @@ impl Drop for Group {
     }
 }
 
-/// Sets `flag` at the first SIGINT (Ctrl-C), SIGTERM or SIGHUP (the terminal is closed); the second ends the program at
-/// once, with code 130. A thread runs `answer` after Ctrl-C, because signal handlers may not print.
+/// Whether the program was started to ignore SIGHUP, as `nohup` starts programs. Known on Linux alone.
+fn ignores_hangup() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> (SIGHUP - 1) & 1 == 1)
+}
+
+/// Sets `flag` at the first SIGINT (Ctrl-C), SIGTERM or, unless `nohup` started the program, SIGHUP (the terminal is
+/// closed); the second ends the program at once, with code 130. A thread runs `answer` after Ctrl-C, because signal
+/// handlers may not print.
 ///
 /// # Errors
 /// A handler or the thread cannot be installed.
 pub fn on_interrupt(flag: &Arc<AtomicBool>, answer: impl FnOnce() + Send + 'static) -> io::Result<()> {
-    for signal in [SIGINT, SIGTERM, SIGHUP] {
+    let hangup = (!ignores_hangup()).then_some(SIGHUP);
+    for signal in [SIGINT, SIGTERM].into_iter().chain(hangup) {
         // In this order: a signal ends the program if the flag is set already, and else sets the flag.
         signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(flag))?;
         signal_hook::flag::register(signal, Arc::clone(flag))?;

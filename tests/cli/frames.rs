@@ -255,6 +255,21 @@ fn machines_share_the_frames_of_a_sequence() {
     assert_eq!(claims, ["out.3.exr.claim"]);
 }
 
+/// With --skip-existing, frames whose checkpoints the user keeps are left alone once they are done.
+#[test]
+fn kept_checkpoints_of_done_frames_are_no_reason_to_render_again() {
+    let folder = folder();
+    let line = format!("render moving.gltf --frames 1-2 -o o.#.exr --checkpoint c.# {SMALL} --skip-existing");
+    folder.run(&line);
+    let written = || {
+        ["o.1.exr", "o.2.exr", "c.1", "c.2"]
+            .map(|name| std::fs::metadata(folder.path(name)).and_then(|data| data.modified()).expect("a file"))
+    };
+    let before = written();
+    folder.run(&line);
+    assert_eq!(written(), before);
+}
+
 /// With --skip-existing, frames that are cut off or zeros are rendered again, and what a killed process has left beside a
 /// finished frame is removed.
 #[test]

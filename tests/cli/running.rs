@@ -123,7 +123,11 @@ fn signal(child: &Child, name: &str) {
 
 #[test]
 fn a_signal_writes_the_finished_iterations() {
-    for name in ["-INT", "-TERM", "-HUP"] {
+    // Children of a test that `nohup` has started ignore SIGHUP.
+    let status = std::fs::read_to_string("/proc/self/status").expect("Linux has it");
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:")).expect("a mask");
+    let hangs_up = u64::from_str_radix(ignored.trim(), 16).expect("a mask") & 1 == 0;
+    for name in ["-INT", "-TERM"].into_iter().chain(hangs_up.then_some("-HUP")) {
         let folder = Folder::new();
         let arguments =
             "render scene.glb -o out.exr --width 64 --photons 2000 --time 600 --no-combine --progress plain";
@@ -144,6 +148,48 @@ fn a_signal_writes_the_finished_iterations() {
         assert!(text.ends_with(&format!("{last}{hint}")), "{text}");
         assert!(folder.path("out.exr.checkpoint").exists());
     }
+}
+
+/// A single picture that was stopped is not there yet: the same command with --skip-existing goes on.
+#[test]
+fn skip_existing_goes_on_with_a_stopped_picture() {
+    let folder = Folder::new();
+    let line = "render scene.glb -o out.exr --width 64 --photons 2000 --iterations 400 --progress plain --skip-existing";
+    let mut child = folder.command(line).stderr(Stdio::piped()).spawn().expect("the program starts");
+    let mut rest = wait_for_line(&mut child, "iteration 1 ");
+    signal(&child, "-TERM");
+    let status = child.wait().expect("the program ends");
+    let mut text = String::new();
+    rest.read_to_string(&mut text).expect("stderr can be read");
+    assert_eq!(status.code(), Some(130), "{text}");
+    assert_eq!(folder.read("out.exr").1["stopped"], "interrupted");
+    folder.run(line);
+    let (_, header) = folder.read("out.exr");
+    assert_eq!((&header["stopped"], &header["iterations"]), (&"iterations".into(), &400.into()));
+    assert!(!folder.path("out.exr.checkpoint").exists());
+}
+
+/// A render that `nohup` has started goes on when the terminal is closed.
+#[test]
+fn nohup_keeps_a_render() {
+    let folder = Folder::new();
+    let command = folder.command("render scene.glb -o out.exr --width 64 --photons 2000 --time 3 --progress plain");
+    let mut child = Command::new("sh")
+        .args(["-c", "trap '' HUP; exec \"$0\" \"$@\""])
+        .arg(command.get_program())
+        .args(command.get_args())
+        .envs(command.get_envs().filter_map(|(name, value)| Some((name, value?))))
+        .current_dir(command.get_current_dir().expect("the folder"))
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let mut rest = wait_for_line(&mut child, "iteration 1,");
+    signal(&child, "-HUP");
+    let status = child.wait().expect("the program ends");
+    let mut text = String::new();
+    rest.read_to_string(&mut text).expect("stderr can be read");
+    assert_eq!(status.code(), Some(0), "{text}");
+    assert_eq!(folder.read("out.exr").1["stopped"], "time");
 }
 
 #[test]

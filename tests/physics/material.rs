@@ -134,6 +134,18 @@ fn rough_diffuse_reflection_and_coats_follow_their_textures() {
     assert_eq!(flat.textures().count(), 0);
     assert_eq!(flat.parameters(&surface(), none, 1.5), p);
     assert!((flat.emitted(&surface(), none) - passed * 2.0).length() < 1e-6);
+    // A texture of the strength alone: there is no coat where it is black.
+    let mut masked = Material {
+        clearcoat: Input { factor: 1.0, texture: reference(0) },
+        clearcoat_color: Rgb::splat(0.5).into(),
+        emission: Rgb::ONE,
+        ..Material::default()
+    };
+    masked.tint_emission();
+    for (mask, expected) in [(0.0, 1.0), (1.0, 0.5f32.powf(0.5728))] {
+        let emitted = masked.emitted(&surface(), &[texel([mask, 0.0, 0.0, 1.0])]);
+        assert!((emitted - Rgb::splat(expected)).length() < 1e-3, "{mask}: {emitted}");
+    }
     // Without textures the reader has tinted the emission.
     let mut plain = Material { clearcoat: 1.0.into(), clearcoat_color: Rgb::splat(0.5).into(), ..Material::default() };
     plain.emission = Rgb::ONE;

@@ -7,6 +7,7 @@
 
 use crate::support;
 
+use caustique::material::{Alpha, Material};
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
 use caustique::render::{
     Control, InitialBandwidth, Levels, Method, PHOTON_BYTES, Rendered, Settings, Shard, photons_per_path, render,
@@ -16,7 +17,7 @@ use caustique::scene::{Description, Scene};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, square};
 use support::stats::{mean_and_error, t_critical};
 
-const TESTS: usize = 7;
+const TESTS: usize = 12;
 const ERROR_RATE: f64 = 1e-3;
 const SEEDS: u64 = 32;
 const SIZE: u32 = 8;
@@ -130,13 +131,19 @@ fn a_full_map_is_not_darker() {
     check("full", &values, 1.0, 5e-3, 0.03);
 }
 
-/// The sun shines straight down through a glass slab on to a plane: a uniform caustic.
-#[test]
-fn sun_through_a_slab() {
+/// The sun shines straight down through a glass slab on to a plane: a uniform caustic. Returns the scene, and the mean of
+/// its picture.
+fn sun_through_slab(alpha: f32) -> (Scene, f64) {
     let (rho, e, n) = (0.5f32, 3.0f32, 1.5f64);
     let mut description = Description::default();
     let floor = quad(Vec3::new(-0.5, 0.0, -0.5), Vec3::Z, Vec3::X);
-    add(&mut description, "plane", floor, matte(rho, 0.0));
+    let kind = if alpha < 1.0 { Alpha::Blend } else { Alpha::Opaque };
+    add(
+        &mut description,
+        "plane",
+        floor,
+        Material { alpha: kind, base_color: [rho, rho, rho, alpha], ..matte(rho, 0.0) },
+    );
     // High above, so that little of the light that the plane reflects comes back from the slab (1e-3).
     add(&mut description, "slab", cuboid(Vec3::new(-0.5, 4.0, -0.5), Vec3::new(0.5, 4.1, 0.5), false), glass(n as f32));
     description.lights.push(PunctualLight {
@@ -156,9 +163,26 @@ fn sun_through_a_slab() {
     let scene = build(description);
     let reflectance = ((n - 1.0) / (n + 1.0)).powi(2);
     let slab = (1.0 - reflectance) / (1.0 + reflectance);
-    let expected = f64::from(rho * e) / std::f64::consts::PI * slab;
+    (scene, f64::from(rho * alpha * e) / std::f64::consts::PI * slab)
+}
+
+#[test]
+fn caustics_through_a_slab() {
+    let (scene, expected) = sun_through_slab(1.0);
     let values: Vec<f64> = (0..SEEDS).map(|seed| mean(&picture(&scene, &settings(200_000, seed)))).collect();
     check("caustic", &values, expected, 6e-3, 0.02);
+}
+
+/// A light path and a camera path that meet at a sheet have both hit it, with a probability of alpha each. Light counts
+/// alpha once.
+#[test]
+fn caustics_on_a_sheet_count_its_alpha_once() {
+    let (scene, expected) = sun_through_slab(0.4);
+    for method in [Method::Pm, Method::Sppm, Method::Cppm, Method::Bpm, Method::Vcm] {
+        let of = |seed| Settings { method, iterations: Some(32), ..settings(5000, seed) };
+        let values: Vec<f64> = (0..SEEDS).map(|seed| mean(&picture(&scene, &of(seed)))).collect();
+        check(method.name(), &values, expected, 1e-2, 0.5);
+    }
 }
 
 /// All iterations and shards use the same map, for any number of threads.

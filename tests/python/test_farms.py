@@ -135,7 +135,9 @@ class Slurm(support.Scratch):
             (["--shards", "0"], "'0' is no count"),
             (["--shards", "2", "--frames", "3"], None),
             (["--shards", "2", "--frames", "b"], "--frames: 'b'"),
+            (["--shards", "2", "--frames", "10-5"], "ends before it begins"),
             (["--shards", "2", "--png", "a.png"], "no shard is a picture"),
+            (["--shards", "2", "--layers=all"], "no shard is a picture"),
             (["--shards", "2", "--resume", "a"], "given by the farm"),
         ):
             with self.subTest(words):

@@ -26,6 +26,8 @@ const FIRST_WITH_SHADOW_LINKS: u64 = 5000;
 const FIRST_WITH_OUTER_LAMPS: u64 = 6000;
 /// First seed of scenes with panoramas and pixel filters.
 pub const FIRST_WITH_PANORAMAS: u64 = 7000;
+/// First seed of scenes in which opaque things have an alpha.
+pub const FIRST_WITH_SHEETS: u64 = 8000;
 /// Number of attempts to find a place for a thing.
 const ATTEMPTS: usize = 40;
 
@@ -72,6 +74,13 @@ pub fn generate(seed: u64) -> World {
         if seed >= FIRST_WITH_PANORAMAS {
             generator.panoramas();
             generator.filter();
+        }
+        if seed >= FIRST_WITH_SHEETS && generator.random.chance(0.4) {
+            for matter in generator.world.materials.iter_mut().filter(|matter| !matter.is_glass()) {
+                if generator.random.chance(0.5) {
+                    matter.alpha = generator.random.within(0.2, 0.8);
+                }
+            }
         }
         generator.random = own;
     }

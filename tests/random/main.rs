@@ -100,6 +100,16 @@ fn relations_hold_in_panoramas() {
     check_relations(rooms);
 }
 
+/// Rooms whose walls and things let some of the light pass.
+#[test]
+fn relations_hold_among_sheets() {
+    let is_sheet = |matter: &world::Matter| matter.alpha < 1.0 && !matter.is_glass();
+    let has_sheets = |seed: &u64| generate(*seed).materials.iter().any(is_sheet);
+    let rooms: Vec<u64> = (generate::FIRST_WITH_SHEETS..8100).filter(has_sheets).take(2).collect();
+    assert_eq!(rooms.len(), 2, "{rooms:?}");
+    check_relations(rooms);
+}
+
 #[test]
 #[ignore = "long"]
 fn relations_hold_in_more_scenes() {

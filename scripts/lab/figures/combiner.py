@@ -5,7 +5,7 @@ with five levels and two camera paths, or one; the deep combiner, whose budget i
 tracing denoised by OIDN; and the default finish of `sppm`. The time of networks, denoiser and finish is not in the
 budget; the last column has that of the networks in core-seconds, with the start of PyTorch. out/combiner/ has a page of
 pictures for each scene and budget, with maps of the networks' weights; docs/lab/combiner/ has those of the largest
-budget.
+budget, unless the figure has a name.
 """
 
 from pathlib import Path
@@ -30,6 +30,7 @@ ARGUMENTS = references.ARGUMENTS | {
     "seeds": 3,
     "threads": 1,
     "clock": "cpu",
+    "name": "",
 }
 # relMSE of SPPM and of the paper's combination (figure 7 and table 1), by the kind of scene.
 PAPER = {"interior": (0.0082, 0.0017), "pool": (0.0219, 0.0052)}
@@ -166,7 +167,7 @@ def draw(scene, budget, last, reference):
         numbers = sorted(made.shares, key=lambda share: int(share.removeprefix("Share")))
         shares |= {f"{name} {number}": made.shares[number] for number in dict.fromkeys(numbers[:1] + numbers[-1:])}
     file = ROOT / "out" / "combiner" / f"{stem}-{budget:g}.png"
-    if budget == max(options.budgets):
+    if budget == max(options.budgets) and not options.name:
         file = ROOT / "docs" / "lab" / "combiner" / f"{stem}.jpg"
     page(file, {name: made.picture for name, made in last.items()}, shares, reference.mean)
     print(f"    {file}")
@@ -188,4 +189,5 @@ def main():
     for name in {name: None for cell in cells for name in cell["rows"]}:
         print(f"    {name:<16}{relative(cells, name):>10.3f}")
     settings = {"program": program(), **{key: getattr(options, key) for key in ("width", "threads", "seeds")}}
+    settings |= {"set": options.name} if options.name else {}
     record("combiner", {**settings, "cells": cells})

@@ -32,16 +32,17 @@ pub use summary::{Summary, place, print_finish, print_picture, warn_unseen};
 
 /// Renders a scene, or frames of its animation, as `caustique render`.
 pub fn run(args: &RenderArgs) -> Result<()> {
-    let args = &args.with_outputs();
+    let mut args = args.with_outputs();
     super::pool(args.run.threads)?.install(|| match args.options.scene.frames {
-        Some(frames) => sequence::run(args, frames),
+        Some(frames) => sequence::run(&args, frames),
         None => {
-            sequence::refuse_patterns(args)?;
-            if args.skip_existing && args.run.resume.is_none() && sequence::is_there(args) {
-                pass_over(args, None, "is there");
+            sequence::refuse_patterns(&args)?;
+            args.run.resume = args.run.resume.take().or_else(|| sequence::left(&args));
+            if args.skip_existing && args.run.resume.is_none() && sequence::is_there(&args) {
+                pass_over(&args, None, "is there");
                 return Ok(());
             }
-            render_one(args, &files::outputs(args)?, None)
+            render_one(&args, &files::outputs(&args)?, None)
         }
     })
 }

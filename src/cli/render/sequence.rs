@@ -9,8 +9,10 @@ use crate::cli::signals::Interrupt;
 use crate::cli::{output, say};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::options::{FrameSeed, Frames, is_pattern, path_of_frame};
+use caustique::pipeline::checkpoint;
 use caustique::pipeline::merge::is_shard;
 use caustique::scene::{blend, gltf, usd};
+use std::path::PathBuf;
 
 /// Renders the frames in order. Ends at the first frame that fails, as Blender does; the frames before it are written.
 pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
@@ -23,12 +25,7 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
     let count = frames.iter().len();
     for (before, frame) in frames.iter().enumerate() {
         let mut one = args.at(frame);
-        // The checkpoint that a stopped run has left of this frame.
-        let left = || {
-            let left = one.saving().map(|saving| saving.path);
-            left.filter(|path| args.skip_existing && !args.run.overwrite && path.is_file())
-        };
-        let done = || args.skip_existing && left().is_none() && is_there(&one);
+        let done = || args.skip_existing && left(&one).is_none() && is_there(&one);
         if done() {
             pass_over(&one, Some(frame), "is there");
             files::remove_leftovers(&one);
@@ -49,7 +46,7 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
             pass_over(&one, Some(frame), "is there");
             continue;
         }
-        let left = left();
+        let left = left(&one);
         if Interrupt::has_come() {
             let cause = format!("interrupted before frame {frame}; the frames before it are written");
             return Err(Error::new(ErrorKind::Interrupted, args.output.display(), cause)
@@ -101,6 +98,12 @@ fn first_alone(args: &RenderArgs, frames: Frames) -> Frames {
     let scene = args.options.scene.path.display();
     say(&format!("warning: {scene}: nothing moves, so its frames are all the same: only frame {first} is rendered"));
     Frames::one(first)
+}
+
+/// The checkpoint that a stopped run has left of a picture, from which `--skip-existing` goes on.
+pub(super) fn left(args: &RenderArgs) -> Option<PathBuf> {
+    let left = args.saving().map(|saving| saving.path);
+    left.filter(|path| args.skip_existing && !args.run.overwrite && checkpoint::is_unfinished(path))
 }
 
 /// Whether the output of the frame is there and whole: a copy may have been cut off, and an empty file is a placeholder.

@@ -411,7 +411,8 @@ impl<'a, B: GatherBandwidths> Visitor<'a> for GatheringWalk<'_, B> {
     }
 
     fn hole(&mut self) {
-        self.sample.first = Some(FirstHit::HOLE);
+        // A medium before it may have stopped the ray.
+        self.sample.first.get_or_insert(FirstHit::HOLE);
     }
 
     #[inline]

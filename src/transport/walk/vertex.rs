@@ -8,6 +8,7 @@ use super::roulette::survival;
 use super::segment::MediumArrival;
 use crate::bsdf::{BsdfSample, LobeSet, Shading};
 use crate::geometry::Surface;
+use crate::material::Alpha;
 use crate::math::{Rgb, Vec3};
 use crate::medium::{FlightDensity, HenyeyGreenstein};
 use crate::random::Draws;
@@ -64,6 +65,21 @@ impl Vertex<'_, '_> {
     #[inline(always)]
     pub fn presence(&self, scene: &Scene) -> Presence {
         Presence::at_surface(scene, [&self.interior, &self.interior_behind])
+    }
+
+    /// Probability of all that alpha has decided for the path to end here: about the solids around, and about the hit. A
+    /// light path and a camera path that meet at a surface have both decided it, and light counts it once.
+    #[inline(always)]
+    pub fn chance(&self, scene: &Scene) -> f32 {
+        if !scene.survey.alpha {
+            return 1.0;
+        }
+        let material = &scene.materials.list[self.surface.material as usize];
+        let hit = match material.alpha_per_hit() {
+            Alpha::Blend => material.coverage(self.surface, &scene.materials.textures),
+            Alpha::Opaque | Alpha::Mask(_) => 1.0,
+        };
+        self.presence(scene).chance * hit
     }
 
     /// Probability that roulette lets the path continue if the visitor asks for the lobes in `set`. It does not depend
