@@ -6,8 +6,10 @@ from .markdown import digits, table
 
 
 def relative(cells, name, key="relmse_trimmed"):
-    """The geometric mean over the cells that have a row of its error relative to `sppm`."""
+    """The geometric mean over the cells that have a row of its error relative to `sppm`; None if none has it."""
     found = [cell["rows"] for cell in cells if name in cell["rows"]]
+    if not found:
+        return None
     return geometric_mean(max(rows[name][key], 1e-6) / max(rows["sppm"][key], 1e-6) for rows in found)
 
 
