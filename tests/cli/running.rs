@@ -154,7 +154,8 @@ fn a_signal_writes_the_finished_iterations() {
 #[test]
 fn skip_existing_goes_on_with_a_stopped_picture() {
     let folder = Folder::new();
-    let line = "render scene.glb -o out.exr --width 64 --photons 2000 --iterations 400 --progress plain --skip-existing";
+    let line =
+        "render scene.glb -o out.exr --width 64 --photons 2000 --iterations 400 --progress plain --skip-existing";
     let mut child = folder.command(line).stderr(Stdio::piped()).spawn().expect("the program starts");
     let mut rest = wait_for_line(&mut child, "iteration 1 ");
     signal(&child, "-TERM");
