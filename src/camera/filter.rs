@@ -5,10 +5,11 @@
 //! whose filters cover the point, drawn in proportion to the filters there. A filter is the product of `f(dx)` and
 //! `f(dy)`, with distances from the centre of the pixel in pixels, and `integral f = 1`.
 
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// A pixel filter with its width in pixels, as Blender defines filter widths.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Filter {
     /// Constant on a square whose side is the width.
     Box(f32),

@@ -114,6 +114,14 @@ fn read_to_line(lines: &mut impl BufRead, start: &str) {
     }
 }
 
+/// The rest of stderr of a program, which ends with this code.
+fn ended(child: &mut Child, mut rest: impl Read, code: i32) -> String {
+    let mut text = String::new();
+    rest.read_to_string(&mut text).expect("stderr can be read");
+    assert_eq!(child.wait().expect("the program ends").code(), Some(code), "{text}");
+    text
+}
+
 fn signal(child: &Child, name: &str) {
     // `kill` of the shell, because a minimal Debian has no such program.
     let kill = format!("kill {name} {}", child.id());
@@ -133,12 +141,9 @@ fn a_signal_writes_the_finished_iterations() {
             "render scene.glb -o out.exr --width 64 --photons 2000 --time 600 --no-combine --progress plain";
         let mut command = folder.command(arguments);
         let mut child = command.stderr(Stdio::piped()).spawn().expect("the program starts");
-        let mut rest = wait_for_line(&mut child, "iteration 1,");
+        let rest = wait_for_line(&mut child, "iteration 1,");
         signal(&child, name);
-        let status = child.wait().expect("the program ends");
-        let mut text = String::new();
-        rest.read_to_string(&mut text).expect("stderr can be read");
-        assert_eq!(status.code(), Some(130), "{text}");
+        let text = ended(&mut child, rest, 130);
         let (set, header) = folder.read("out.exr");
         let iterations = header["iterations"].as_u64().expect("a number");
         assert!(iterations >= 1 && set.get("Level1").is_some());
@@ -157,12 +162,9 @@ fn skip_existing_goes_on_with_a_stopped_picture() {
     let line =
         "render scene.glb -o out.exr --width 64 --photons 2000 --iterations 400 --progress plain --skip-existing";
     let mut child = folder.command(line).stderr(Stdio::piped()).spawn().expect("the program starts");
-    let mut rest = wait_for_line(&mut child, "iteration 1 ");
+    let rest = wait_for_line(&mut child, "iteration 1 ");
     signal(&child, "-TERM");
-    let status = child.wait().expect("the program ends");
-    let mut text = String::new();
-    rest.read_to_string(&mut text).expect("stderr can be read");
-    assert_eq!(status.code(), Some(130), "{text}");
+    ended(&mut child, rest, 130);
     assert_eq!(folder.read("out.exr").1["stopped"], "interrupted");
     folder.run(line);
     let (_, header) = folder.read("out.exr");
@@ -184,12 +186,9 @@ fn nohup_keeps_a_render() {
         .stderr(Stdio::piped())
         .spawn()
         .expect("the program starts");
-    let mut rest = wait_for_line(&mut child, "iteration 1,");
+    let rest = wait_for_line(&mut child, "iteration 1,");
     signal(&child, "-HUP");
-    let status = child.wait().expect("the program ends");
-    let mut text = String::new();
-    rest.read_to_string(&mut text).expect("stderr can be read");
-    assert_eq!(status.code(), Some(0), "{text}");
+    ended(&mut child, rest, 0);
     assert_eq!(folder.read("out.exr").1["stopped"], "time");
 }
 
@@ -199,12 +198,9 @@ fn a_signal_writes_the_report_of_an_unfinished_comparison() {
     folder.run("render scene.glb -o reference.exr --method bdpt --width 48 --height 36 --iterations 4 --seed 9");
     let arguments = "converge scene.glb --width 48 --height 36 --methods bdpt,path --time 600 --reference reference.exr --progress plain -o out";
     let mut child = folder.command(arguments).stderr(Stdio::piped()).spawn().expect("the program starts");
-    let mut rest = wait_for_line(&mut child, "0 %, ");
+    let rest = wait_for_line(&mut child, "0 %, ");
     signal(&child, "-INT");
-    let status = child.wait().expect("the program ends");
-    let mut text = String::new();
-    rest.read_to_string(&mut text).expect("stderr can be read");
-    assert_eq!(status.code(), Some(130), "{text}");
+    let text = ended(&mut child, rest, 130);
     assert!(text.ends_with("out: interrupted; the report on what was done is written\n"), "{text}");
     let json = std::fs::read_to_string(folder.path("out/points.json")).expect("it is there");
     let json: Value = serde_json::from_str(&json).expect("it is JSON");
@@ -265,11 +261,9 @@ fn waits_are_explained() {
     std::fs::copy(blocks, folder.path("blocks.glb")).expect("it can be copied");
     let arguments = "render blocks.glb -o out.exr --width 640 --time 3600 --progress plain";
     let mut child = folder.command(arguments).stderr(Stdio::piped()).spawn().expect("the program starts");
-    let mut rest = wait_for_line(&mut child, "choosing a method\n");
+    let rest = wait_for_line(&mut child, "choosing a method\n");
     signal(&child, "-INT");
-    let mut text = String::new();
-    rest.read_to_string(&mut text).expect("stderr can be read");
-    assert_eq!(child.wait().expect("it ends").code(), Some(130), "{text}");
+    let text = ended(&mut child, rest, 130);
     let end = "out.exr: interrupted before the first iteration; nothing is written\n";
     assert_eq!(text, format!("stopping; press again to stop now\n{end}"));
 
@@ -361,12 +355,10 @@ fn an_output_folder_that_disappears_loses_no_render() {
     let mut command = folder.command(arguments);
     command.env("TMPDIR", folder.path("temporary"));
     let mut child = command.stderr(Stdio::piped()).spawn().expect("the program starts");
-    let mut rest = wait_for_line(&mut child, "{\"iteration\":");
+    let rest = wait_for_line(&mut child, "{\"iteration\":");
     std::fs::remove_dir_all(folder.path("gone")).expect("it can be removed");
     signal(&child, "-INT");
-    let mut text = String::new();
-    rest.read_to_string(&mut text).expect("stderr can be read");
-    assert_eq!(child.wait().expect("it ends").code(), Some(1), "{text}");
+    let text = ended(&mut child, rest, 1);
     let error: Value = serde_json::from_str(text.trim_end().lines().last().unwrap_or_default()).expect("an event");
     assert!(error["message"].as_str().is_some_and(|message| message.starts_with("gone/out.exr: ")), "{text}");
     let hint = error["hint"].as_str().unwrap_or_default();

@@ -7,8 +7,9 @@ use super::random::Random;
 use super::relation::similar;
 use super::shapes::{cuboid, disc, joined, lathe, prism, quad, sphere, triangle, vessel};
 use super::world::{
-    Lens, Light, LightKind, Matter, Medium, Mesh, Panorama, PixelFilter, Placement, Texture, Thing, ThingKind, World,
+    Lens, Light, LightKind, Matter, Medium, Mesh, Panorama, Placement, Texture, Thing, ThingKind, World,
 };
+use caustique::camera::Filter;
 use glam::{DQuat, DVec2, DVec3, EulerRot};
 use std::f64::consts::{PI, TAU};
 
@@ -600,10 +601,10 @@ impl Generator {
     fn filter(&mut self) {
         let width = self.random.within(0.5, 8.0) as f32;
         self.world.filter = match self.random.below(6) {
-            0 => PixelFilter::Box(width),
-            1 => PixelFilter::Gaussian(width),
-            2 => PixelFilter::BlackmanHarris(width),
-            _ => PixelFilter::Pixel,
+            0 => Filter::Box(width),
+            1 => Filter::Gaussian(width),
+            2 => Filter::BlackmanHarris(width),
+            _ => Filter::default(),
         };
     }
 

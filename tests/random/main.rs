@@ -24,6 +24,7 @@ mod usd;
 mod world;
 mod write;
 
+use caustique::camera::Filter;
 use caustique::render::{Method, Settings, learn_light};
 use caustique::scene::View;
 use forms::{FORMS, Form};
@@ -32,7 +33,6 @@ use picture::{SEEDS, Shot, differences, pictures, read};
 use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
 use relation::{Relation, check};
 use std::ops::Range;
-use world::PixelFilter;
 
 /// Seeds of the scenes whose relations are checked.
 const SCENES: Range<u64> = 0..12;
@@ -65,9 +65,7 @@ fn relations_hold() {
 #[test]
 fn relations_hold_behind_windows() {
     let has_window = |seed: &u64| generate(*seed).things.iter().any(|thing| thing.name.ends_with("with a window"));
-    let rooms: Vec<u64> = (4000..4100).filter(has_window).take(1).collect();
-    assert_eq!(rooms.len(), 1, "{rooms:?}");
-    check_relations(rooms);
+    check_first(1, 4000..4100, has_window);
 }
 
 /// Rooms with bright lamps behind their walls, where renders learn which lights arrive.
@@ -82,9 +80,7 @@ fn relations_hold_beside_lamps_behind_walls() {
         let camera = scene.camera(&Shot::new(Method::Path, world.cameras()[0]).view(&world)).expect("a camera");
         learn_light(View::new(&scene, &camera), &Settings::default()).lights.is_some()
     };
-    let rooms: Vec<u64> = (6000..6060).filter(learns).take(1).collect();
-    assert_eq!(rooms.len(), 1, "{rooms:?}");
-    check_relations(rooms);
+    check_first(1, 6000..6060, learns);
 }
 
 /// Pictures of all directions, with pixel filters that reach over their edges.
@@ -93,11 +89,9 @@ fn relations_hold_in_panoramas() {
     let is_chosen = |seed: &u64| {
         let world = generate(*seed);
         let shot = Shot::new(Method::Path, world.cameras()[*seed as usize % world.cameras().len()]);
-        world.filter != PixelFilter::Pixel && Relation::Panned.other(&world, &shot).is_some()
+        world.filter != Filter::default() && Relation::Panned.other(&world, &shot).is_some()
     };
-    let rooms: Vec<u64> = (generate::FIRST_WITH_PANORAMAS..7100).filter(is_chosen).take(2).collect();
-    assert_eq!(rooms.len(), 2, "{rooms:?}");
-    check_relations(rooms);
+    check_first(2, generate::FIRST_WITH_PANORAMAS..7100, is_chosen);
 }
 
 /// Rooms whose walls and things let some of the light pass.
@@ -105,15 +99,20 @@ fn relations_hold_in_panoramas() {
 fn relations_hold_among_sheets() {
     let is_sheet = |matter: &world::Matter| matter.alpha < 1.0 && !matter.is_glass();
     let has_sheets = |seed: &u64| generate(*seed).materials.iter().any(is_sheet);
-    let rooms: Vec<u64> = (generate::FIRST_WITH_SHEETS..8100).filter(has_sheets).take(2).collect();
-    assert_eq!(rooms.len(), 2, "{rooms:?}");
-    check_relations(rooms);
+    check_first(2, generate::FIRST_WITH_SHEETS..8100, has_sheets);
 }
 
 #[test]
 #[ignore = "long"]
 fn relations_hold_in_more_scenes() {
     check_relations(MORE_SCENES);
+}
+
+/// Checks the first scenes of some seeds that are `chosen`.
+fn check_first(count: usize, seeds: Range<u64>, chosen: impl Fn(&u64) -> bool) {
+    let rooms: Vec<u64> = seeds.filter(chosen).take(count).collect();
+    assert_eq!(rooms.len(), count, "{rooms:?}");
+    check_relations(rooms);
 }
 
 fn check_relations(seeds: impl IntoParallelIterator<Item = u64>) {

@@ -1,10 +1,10 @@
 //! Pictures of several seeds, and the test whether two sets of them differ.
 
 use super::usd;
-use super::world::{PixelFilter, World};
+use super::world::World;
 use super::write::glb;
 use crate::support::stats::mean_and_error;
-use caustique::camera::{Camera, Filter};
+use caustique::camera::Camera;
 use caustique::material::{Material, MediumGrids};
 use caustique::math::Vec3;
 use caustique::medium::{DensityGrid, EmissionGrid, Grid};
@@ -88,18 +88,12 @@ impl Shot {
 
     pub fn view(&self, world: &World) -> CameraRequest {
         let tile = SIZE / TILES;
-        let filter = match world.filter {
-            PixelFilter::Pixel => Filter::default(),
-            PixelFilter::Box(width) => Filter::Box(width),
-            PixelFilter::Gaussian(width) => Filter::Gaussian(width),
-            PixelFilter::BlackmanHarris(width) => Filter::BlackmanHarris(width),
-        };
         CameraRequest {
             camera: Some(if self.usd { usd::camera(&self.camera) } else { self.camera.clone() }),
             width: Some(SIZE),
             height: Some(SIZE),
             crop: self.window.map(|window| Crop::Pixels(window.map(|side| side * tile))),
-            filter,
+            filter: world.filter,
             ..CameraRequest::default()
         }
     }

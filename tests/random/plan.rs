@@ -12,7 +12,8 @@ pub const OTHERS: [Method; 7] =
     [Method::Light, Method::Mlt, Method::Appm, Method::Cppm, Method::Ppm, Method::Bpm, Method::Pm];
 
 /// `count` checks of the scene of a seed with the four methods, in an order that covers all pairs of relation and
-/// method; one check with another method; one of a turned panorama, and one comparison of two methods. With shadow linking, path tracing alone.
+/// method; one check with another method; one of a turned panorama; and one comparison of two methods. With shadow
+/// linking, path tracing alone.
 pub fn checks(world: &World, count: usize) -> Vec<(Relation, Shot)> {
     let i = world.seed as usize;
     let cameras = world.cameras();

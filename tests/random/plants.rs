@@ -2,7 +2,8 @@
 
 use super::forms::{Form, Known};
 use super::relation::{Other, Relation, lifted, switch_off};
-use super::world::{Medium, Mesh, PixelFilter, Thing, ThingKind, World};
+use super::world::{Medium, Mesh, Thing, ThingKind, World};
+use caustique::camera::Filter;
 use glam::DVec3;
 
 /// A planted bug in one of the two sides of a relation.
@@ -96,8 +97,8 @@ fn widen(_: &mut World, other: &mut Other) -> bool {
 }
 
 fn forget_the_filter(world: &mut World, other: &mut Other) -> bool {
-    other.worlds[0].filter = PixelFilter::Pixel;
-    world.filter != PixelFilter::Pixel
+    other.worlds[0].filter = Filter::default();
+    world.filter != Filter::default()
 }
 
 fn keep_the_camera(world: &mut World, other: &mut Other) -> bool {

@@ -466,11 +466,11 @@ pub fn lifted(world: &World, share: f64) -> Option<World> {
 
 /// Turns a panorama of all directions by a tile to the left. `None` for other cameras.
 fn panned(world: &World, camera: &str) -> Option<World> {
+    let is_whole = |kind| matches!(kind, ThingKind::Camera(Lens { panorama: Some(Panorama::WHOLE), .. }));
+    let index = world.things.iter().position(|thing| thing.name == camera && is_whole(thing.kind))?;
     let mut made = world.clone();
-    let thing = made.things.iter_mut().find(|thing| thing.name == camera)?;
-    let whole = matches!(thing.kind, ThingKind::Camera(Lens { panorama: Some(Panorama::WHOLE), .. }));
-    thing.chain.push(Placement::turned(DQuat::from_rotation_y(TAU / f64::from(TILES))));
-    whole.then_some(made)
+    made.things[index].chain.push(Placement::turned(DQuat::from_rotation_y(TAU / f64::from(TILES))));
+    Some(made)
 }
 
 /// Mirrors every mesh, and mirrors it back by its node.

@@ -1,6 +1,7 @@
 //! Reduces a failing scene as far as possible while it still fails.
 
-use super::world::{Lens, LightKind, Matter, PixelFilter, Placement, ThingKind, World};
+use super::world::{Lens, LightKind, Matter, Placement, ThingKind, World};
+use caustique::camera::Filter;
 use glam::DVec3;
 
 /// Returns the smallest scene found for which `fails` is true, by removing and simplifying one thing after another.
@@ -45,7 +46,7 @@ fn without_space(world: &World, index: usize) -> Candidate {
     Some(match index {
         0 => world.sky.map(|_| World { sky: None, ..world.clone() }),
         1 => world.fog.map(|_| World { fog: None, ..world.clone() }),
-        2 => (world.filter != PixelFilter::Pixel).then(|| World { filter: PixelFilter::Pixel, ..world.clone() }),
+        2 => (world.filter != Filter::default()).then(|| World { filter: Filter::default(), ..world.clone() }),
         _ => return None,
     })
 }

@@ -1,5 +1,6 @@
 //! A scene as plain data that can be transformed and then written as glTF.
 
+use caustique::camera::Filter;
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -27,18 +28,7 @@ pub struct World {
     pub later: Option<Later>,
     /// Filter of the pixels.
     #[serde(default)]
-    pub filter: PixelFilter,
-}
-
-/// Filter of the pixels, with its width (pixels).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub enum PixelFilter {
-    /// The pixel itself.
-    #[default]
-    Pixel,
-    Box(f32),
-    Gaussian(f32),
-    BlackmanHarris(f32),
+    pub filter: Filter,
 }
 
 /// A scene that appears after its frame 0: lights are dark at the frame and things have other sizes. Frames last a

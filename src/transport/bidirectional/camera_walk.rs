@@ -383,7 +383,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
                     mis: &self.mis,
                     joins,
                     absent: presence.absent,
-                    own: one_merge(self.history.delta) * f64::from(vertex.chance(camera_paths.scene)),
+                    own: one_merge(self.history.delta) * f64::from(vertex.meeting(camera_paths.scene).chance),
                     suffix: self.history.suffix,
                     lobes: self.lobes.as_ref(),
                     classes: camera_paths.classes,
@@ -458,7 +458,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
 
     #[inline]
     fn scatter(&mut self, vertex: &Vertex<'_, 'a>, sample: &BsdfSample) {
-        let chance = f64::from(vertex.chance(self.shared.camera_paths.scene));
+        let chance = f64::from(vertex.meeting(self.shared.camera_paths.scene).chance);
         let merges = self.shared.techniques.camera_vertex_merge(vertex.depth, self.history.delta) * chance;
         let joins = self.joins(vertex.depth);
         if let Some(lobes) = &mut self.lobes {

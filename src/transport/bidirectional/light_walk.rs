@@ -230,9 +230,9 @@ impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
             && techniques.light_vertex_merges(vertex.depth)
             && vertex.depth < camera_paths.max_depth
         {
-            let flux = vertex.throughput / (*merged_paths * vertex.chance(camera_paths.scene));
-            let (joins, absent) = (self.joins(vertex.depth), vertex.presence(camera_paths.scene).absent);
-            self.left.photons.push(MergePhoton::new(vertex, flux, self.prefix, self.group, &self.mis, joins, absent));
+            let flux = vertex.throughput / *merged_paths;
+            let (joins, presence) = (self.joins(vertex.depth), vertex.meeting(camera_paths.scene));
+            self.left.photons.push(MergePhoton::new(vertex, flux, self.prefix, self.group, &self.mis, joins, presence));
         }
         let connected = self.shared.connects_light_vertex(vertex.depth);
         if connected && lobes.intersects(LobeSet::SMOOTH) && !self.photons_only && vertex.depth < camera_paths.max_depth
@@ -314,7 +314,7 @@ impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
     #[inline]
     fn scatter(&mut self, vertex: &Vertex<'_, 's>, sample: &BsdfSample) {
         let scene = self.shared.camera_paths.scene;
-        let chance = f64::from(vertex.chance(scene));
+        let chance = f64::from(vertex.meeting(scene).chance);
         let merges = self.shared.techniques.light_vertex_merge(vertex.depth) * chance;
         let joins = self.joins(vertex.depth);
         self.mis = scatter(self.mis, vertex, sample, Transport::Radiance, joins, merges);

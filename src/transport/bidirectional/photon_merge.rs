@@ -9,6 +9,7 @@ use crate::math::{Rgb, Vec3, is_lit};
 use crate::path_class::{CameraSuffix, ClassSet, LightPrefix, PathClass};
 use crate::photon::{Located, PhotonMap, same_surface};
 use crate::spectrum::Band;
+use crate::transport::walk::interior::Presence;
 use crate::transport::walk::lobe_layers::{FirstScatter, LobeHistory};
 use crate::transport::walk::pixel_sample::INNER_AREAS;
 use crate::transport::walk::scattering_vertex::ScatterPoint;
@@ -39,7 +40,7 @@ pub struct MergePhoton {
     band: Band,
     /// Light group of the light that the path starts from.
     group: Group,
-    /// Code of the solids around that alpha lets not exist for the light path ([`crate::transport::walk::interior::Presence::absent`]).
+    /// Code of the solids around that alpha lets not exist for the light path ([`Presence::absent`]).
     absent: u8,
 }
 
@@ -69,7 +70,7 @@ fn single(sum: f64) -> f32 {
 
 impl MergePhoton {
     /// The photon that a light path leaves at `vertex`. `joins` is the number of samples of the technique that joins the
-    /// last two vertices of the light path, `absent` the code of the solids around that alpha lets not exist for it.
+    /// last two vertices of the light path, `presence` what alpha has decided for it to end there.
     #[inline]
     pub fn new(
         vertex: &Vertex<'_, '_>,
@@ -78,13 +79,13 @@ impl MergePhoton {
         group: Group,
         mis: &MisState,
         joins: f64,
-        absent: u8,
+        presence: Presence,
     ) -> MergePhoton {
         MergePhoton {
             p: vertex.surface.p,
             wi: vertex.wo,
             ng: vertex.surface.ng,
-            flux,
+            flux: flux / presence.chance,
             d_vcm: single(mis.d_vcm * joins),
             plain: single(mis.plain),
             merged: single(mis.merged.y + mis.last.y),
@@ -92,7 +93,7 @@ impl MergePhoton {
             prefix,
             band: Band::of_wavelength(vertex.wavelength.as_ref()),
             group,
-            absent,
+            absent: presence.absent,
         }
     }
 
@@ -112,7 +113,7 @@ pub(in crate::transport) struct Merge<'a> {
     pub mis: &'a MisState,
     /// Number of samples of the technique that joins the last two vertices of the camera path.
     pub joins: f64,
-    /// Code of the solids around the vertex that alpha lets not exist ([`crate::transport::walk::interior::Presence::absent`]).
+    /// Code of the solids around the vertex that alpha lets not exist ([`Presence::absent`]).
     pub absent: u8,
     /// Coefficients with which a merge at this vertex counts in MIS weights ([`mis::one_merge`]).
     pub own: Merges,

@@ -14,6 +14,7 @@ use crate::spectrum::{Band, IterationWavelengths, WavelengthSample};
 use crate::stop::Stop;
 use crate::transport::walk::camera_paths::Indirect;
 use crate::transport::walk::initial_media::InitialMedia;
+use crate::transport::walk::interior::Presence;
 use crate::transport::walk::segment::{PrecomputedHit, token};
 use crate::transport::walk::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use crate::transport::walk::{PathStart, walk};
@@ -346,7 +347,7 @@ impl<'a> Visitor<'a> for Deposit<'_> {
         let gathers = vertex.shading.bsdf.lobes() != LobeSet::DELTA;
         let kind = if self.caustic { Kind::Caustic } else { Kind::Indirect };
         if scattered.is_some() && gathers && self.kinds[kind as usize] {
-            let (absent, chance) = (vertex.presence(self.scene).absent, vertex.chance(self.scene));
+            let Presence { absent, chance } = vertex.meeting(self.scene);
             let thinning_key =
                 self.weight.map(|weight| ThinningKey::new(weight * self.scale, vertex.draws.one(Purpose::ThinningKey)));
             self.photons.surface[kind as usize].push(Photon {

@@ -67,19 +67,20 @@ impl Vertex<'_, '_> {
         Presence::at_surface(scene, [&self.interior, &self.interior_behind])
     }
 
-    /// Probability of all that alpha has decided for the path to end here: about the solids around, and about the hit. A
-    /// light path and a camera path that meet at a surface have both decided it, and light counts it once.
+    /// What alpha has decided for the path to end here: about the solids around, and about the hit. A light path and a camera
+    /// path that meet at a surface have both decided it, and light counts it once.
     #[inline(always)]
-    pub fn chance(&self, scene: &Scene) -> f32 {
+    pub fn meeting(&self, scene: &Scene) -> Presence {
         if !scene.survey.alpha {
-            return 1.0;
+            return Presence::CERTAIN;
         }
+        let Presence { absent, chance } = self.presence(scene);
         let material = &scene.materials.list[self.surface.material as usize];
         let hit = match material.alpha_per_hit() {
             Alpha::Blend => material.coverage(self.surface, &scene.materials.textures),
             Alpha::Opaque | Alpha::Mask(_) => 1.0,
         };
-        self.presence(scene).chance * hit
+        Presence { absent, chance: chance * hit }
     }
 
     /// Probability that roulette lets the path continue if the visitor asks for the lobes in `set`. It does not depend
